@@ -1,1 +1,8 @@
-//! To be written.
+//! What a model lacks: fits of its parts to measurements.
+
+mod error;
+mod least_squares;
+mod response_fit;
+
+pub use error::Error;
+pub use response_fit::{Estimate, ResponseFit};

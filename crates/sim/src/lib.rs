@@ -1,1 +1,31 @@
-//! To be written.
+//! A kinematic e-puck that drives laps between walls: ray-cast infra-red sensors, two controllers, slipping wheels,
+//! an overhead camera, and the effects that a real robot adds to these.
+//!
+//! A [`Scene`] is a circuit with its walls cut into straight pieces, a [`World`] what one run of a [`Model`] drives
+//! in (nothing in it changes, so threads share it), a [`Run`] everything that changes. The tick has five stages,
+//! always in this order: sense, decide, act, move, observe.
+
+mod cast;
+mod controller;
+mod effects;
+mod error;
+mod model;
+mod noise;
+mod robot;
+mod run;
+mod sensor;
+mod walls;
+mod world;
+
+pub use cast::{Caster, CasterKind, Hits, LANES, Rays, segment_distance_m};
+pub use controller::Controller;
+pub use effects::{EFFECTS, Effect, Hit, Moment, Param, Pattern, Setting, Spec, Stage, find};
+pub use error::Error;
+pub use model::{Machine, Model, RunRules, WallRules};
+pub use noise::{Stream, Streams};
+pub use robot::{Pose, Robot, Twist, WheelSpeeds};
+pub use run::{Drive, Run, Step, drive};
+pub use sensor::{Beam, Combine, Mount, ReadingNoise, Readings, Response};
+pub use track::Vec2;
+pub use walls::{WallPlace, Walls};
+pub use world::{Circuit, Scene, World};

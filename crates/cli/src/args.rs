@@ -1,0 +1,235 @@
+//! The command line.
+
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand};
+
+/// How far is a simulated robot from the real one, and why?
+///
+/// lapwing drives a simulated e-puck round a walled circuit, samples every lap, simulated or measured, at gates across
+/// the track, and compares the laps with a Point Distribution Model (Roduit, Martinoli and Jacot, IROS 2007).
+///
+/// Without a command it reproduces the paper's experiments on the laps it ships: `lapwing reproduce --out lapwing-report`.
+#[derive(Debug, Parser)]
+#[command(name = "lapwing", version, max_term_width = 110)]
+pub(crate) struct Cli {
+    #[command(flatten)]
+    pub(crate) global: Global,
+    #[command(subcommand)]
+    pub(crate) command: Option<Command>,
+}
+
+/// Flags of every command.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct Global {
+    /// Seed of all random numbers: the same seed gives the same bytes
+    #[arg(long, global = true, default_value_t = 1)]
+    pub(crate) seed: u64,
+    /// Threads to work with; the results do not depend on it [default: all cores]
+    #[arg(long, global = true, value_parser = clap::value_parser!(u16).range(1..))]
+    pub(crate) threads: Option<u16>,
+    /// No progress on stderr
+    #[arg(long, short, global = true)]
+    pub(crate) quiet: bool,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    /// Both experiments of the paper on the circuit: tables, figures, report
+    Reproduce(Reproduce),
+    /// Simulate laps and write them as a data set
+    Drive(Drive),
+    /// Compare data sets, runs or gate tables with a Point Distribution Model
+    Compare(Compare),
+    /// Simulate a grid of model settings and compare each with measured runs
+    Sweep(Sweep),
+    /// Look at a world file: check it, cut its walls
+    #[command(subcommand)]
+    World(World),
+    /// Fit the nonlinear response of an infra-red sensor to measured pairs
+    FitSensor(FitSensor),
+    /// List the effects that the simulator knows beyond the declared model
+    Effects(Effects),
+}
+
+/// A model and what is set otherwise in it.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct ModelArgs {
+    /// Model file (TOML); what it leaves out is as in the shipped model. `roduit2007` names the shipped one
+    pub(crate) model: PathBuf,
+    #[command(flatten)]
+    pub(crate) settings: Settings,
+}
+
+/// What is set otherwise in a model.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct Settings {
+    /// Set one key of the model, e.g. slip.level=1 or controller.kind=rule-based; may be repeated
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    pub(crate) set: Vec<String>,
+    /// World file to use instead of the one that the model names
+    #[arg(long, value_name = "FILE")]
+    pub(crate) world: Option<PathBuf>,
+}
+
+/// Both experiments of section IV: the two controllers, the sensor models, the wall approximation, the wheel slip,
+/// and all of them together; every table of the paper beside ours, every figure, and each claim with its numbers.
+#[derive(Debug, Default, Args)]
+pub(crate) struct Reproduce {
+    /// Measured data set; give one per controller [default: the laps that are shipped]
+    #[arg(long, value_name = "DIR")]
+    pub(crate) measured: Vec<PathBuf>,
+    /// Folder for the report [default: lapwing-report]
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: Option<PathBuf>,
+    /// Simulations with seeds of their own behind every confidence interval
+    #[arg(long, default_value_t = 40, value_name = "N", value_parser = clap::value_parser!(u32).range(2..))]
+    pub(crate) seeds: u32,
+    /// The declared model as JSON on stdout too
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// Simulates runs of laps and writes them as a data set that `compare` reads.
+///
+/// Example: lapwing drive roduit2007 --set slip.level=1 --runs 4 --laps 20 --log --out slippery
+#[derive(Debug, Args)]
+pub(crate) struct Drive {
+    #[command(flatten)]
+    pub(crate) model: ModelArgs,
+    /// Number of runs, each from a random start of its own
+    #[arg(long, default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..))]
+    pub(crate) runs: u32,
+    /// Whole laps per run after the first, which is dropped
+    #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..))]
+    pub(crate) laps: u32,
+    /// Write readings and commands too
+    #[arg(long)]
+    pub(crate) log: bool,
+    /// Force a way of casting rays
+    #[arg(long, value_name = "NAME", value_parser = ["brute", "bvh", "cells", "march"])]
+    pub(crate) caster: Option<String>,
+    /// Folder for the data set
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: PathBuf,
+    /// Print the summary as JSON
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// Builds one Point Distribution Model of all clusters together and gives the distance of every pair (eq. 8), Hotelling's
+/// test (eq. 9) and the energy test.
+///
+/// Each of the arguments is a data set (a folder; every run is a cluster), one run's CSV, or with --sampled a table of
+/// laps that are sampled already.
+#[derive(Debug, Args)]
+pub(crate) struct Compare {
+    /// Data sets, runs, or gate tables
+    #[arg(required = true, value_name = "DATA")]
+    pub(crate) data: Vec<PathBuf>,
+    /// Modes of the PDM to compare in: a number, or all
+    #[arg(long, default_value = "2", value_name = "R")]
+    pub(crate) modes: String,
+    /// The arguments are CSV files with one row per lap and one numeric column per coordinate
+    #[arg(long)]
+    pub(crate) sampled: bool,
+    /// Permutations of the energy test
+    #[arg(long, default_value_t = 999, value_name = "N")]
+    pub(crate) permutations: u32,
+    /// World file to use instead of the one that the data sets name
+    #[arg(long, value_name = "FILE")]
+    pub(crate) world: Option<PathBuf>,
+    /// Print one JSON document instead of tables
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// Folder for tables and pictures
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: Option<PathBuf>,
+}
+
+/// Simulates the grid of all values given and compares each point with every measured run.
+///
+/// Example: lapwing sweep roduit2007 --vary wall.max_error_m=0.001,0.01 --vary slip.level=0.1,1 --measured real --out sweep
+#[derive(Debug, Args)]
+pub(crate) struct Sweep {
+    #[command(flatten)]
+    pub(crate) model: ModelArgs,
+    /// A key of the model and the values it takes; may be repeated
+    #[arg(long, required = true, value_name = "KEY=V1,V2,...")]
+    pub(crate) vary: Vec<String>,
+    /// Measured data set
+    #[arg(long, value_name = "DIR")]
+    pub(crate) measured: PathBuf,
+    /// Simulated runs per grid point and seed
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
+    pub(crate) runs: u32,
+    /// Whole laps per run
+    #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u32).range(2..))]
+    pub(crate) laps: u32,
+    /// How often the whole grid is simulated, each time with a seed of its own
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
+    pub(crate) seeds: u32,
+    /// Go on with a sweep that was stopped
+    #[arg(long)]
+    pub(crate) resume: bool,
+    /// Folder for tables and pictures
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: PathBuf,
+    /// Print sweep.json
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// What can be asked of a world.
+#[derive(Debug, Subcommand)]
+pub(crate) enum World {
+    /// Check a world file: walls, lengths, corridor width, gates
+    Check {
+        /// World file, or the name of a shipped world
+        world: PathBuf,
+        /// Print one JSON document
+        #[arg(long)]
+        json: bool,
+        /// Folder for the picture of the course
+        #[arg(long, value_name = "DIR")]
+        out: Option<PathBuf>,
+    },
+    /// Cut the walls into straight segments for given maximal errors
+    Segments {
+        /// World file, or the name of a shipped world
+        world: PathBuf,
+        /// Maximal distances of a segment from the exact wall, m
+        #[arg(long, required = true, value_delimiter = ',', value_name = "M,...")]
+        max_error: Vec<f64>,
+        /// Print one JSON document
+        #[arg(long)]
+        json: bool,
+        /// Folder for the picture of N against the error
+        #[arg(long, value_name = "DIR")]
+        out: Option<PathBuf>,
+    },
+}
+
+/// Fits reading = a / (1 + (d/d0)^p) by least squares on log reading.
+#[derive(Debug, Args)]
+pub(crate) struct FitSensor {
+    /// CSV with a header; by default the first column is the distance in m and the second the reading
+    pub(crate) pairs: PathBuf,
+    /// Names of the two columns
+    #[arg(long, value_delimiter = ',', num_args = 1, value_name = "D,R")]
+    pub(crate) columns: Option<Vec<String>>,
+    /// Print one JSON document
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// Folder for the picture
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: Option<PathBuf>,
+}
+
+/// Lists every effect with its stage and parameters.
+#[derive(Debug, Args)]
+pub(crate) struct Effects {
+    /// Print one JSON document
+    #[arg(long)]
+    pub(crate) json: bool,
+}

@@ -1,0 +1,116 @@
+//! Gate tables: laps that were sampled already, one row per lap.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::Result;
+
+use crate::dataset::CsvFile;
+use crate::output::Input;
+
+/// Laps as rows of numbers: K x N.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct GateTable {
+    /// The file's name without its ending.
+    pub(crate) name: String,
+    pub(crate) path: PathBuf,
+    /// N names, whatever the file calls its coordinates.
+    pub(crate) header: Vec<String>,
+    /// K laps, at least one, of N finite numbers each.
+    pub(crate) rows: Vec<Vec<f64>>,
+    /// For the manifest.
+    pub(crate) input: Input,
+}
+
+impl GateTable {
+    /// The gate table in a `.csv` or `.csv.gz`.
+    ///
+    /// # Errors
+    /// It cannot be read, has no header or no rows, rows of different length, or a field that is
+    /// not a finite number; with file, line and column.
+    pub(crate) fn load(path: &Path) -> Result<Self> {
+        let mut file = CsvFile::open(path)?;
+        if looks_like_a_lap(&file.header) {
+            return Err(file.header_error(
+                "these look like the numbers of a lap; a line with the names of the columns must \
+                 come first",
+            ));
+        }
+        let columns = file.header.len();
+        let mut rows = Vec::new();
+        while let Some(row) = file.next_row()? {
+            let lap = (0..columns).map(|column| row.required(column));
+            rows.push(lap.collect::<Result<Vec<_>>>()?);
+        }
+        if rows.is_empty() {
+            return Err(file.error("no rows under the header; one for each lap is needed"));
+        }
+        Ok(Self {
+            name: CsvFile::stem(path),
+            path: path.to_owned(),
+            header: file.header,
+            rows,
+            input: file.input,
+        })
+    }
+}
+
+/// Columns may well be named by whole numbers, those of the gates, but not by fractions.
+fn looks_like_a_lap(header: &[String]) -> bool {
+    header.iter().all(|name| name.parse::<f64>().is_ok())
+        && header.iter().any(|name| name.parse::<i64>().is_err())
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use tempfile::TempDir;
+
+    use super::*;
+
+    fn load(text: &str) -> Result<GateTable, String> {
+        let folder = TempDir::new().unwrap();
+        let path = folder.path().join("laps.of.mine.csv");
+        fs::write(&path, text).unwrap();
+        let around = format!("{}/", folder.path().display());
+        GateTable::load(&path).map_err(|error| format!("{error:#}").replace(&around, ""))
+    }
+
+    #[test]
+    fn a_table_is_its_laps() {
+        let table = load("0,1,2\n0.5,-1,1e-3\n1,2,3\n").unwrap();
+        assert_eq!(table.name, "laps.of.mine");
+        assert_eq!(table.header, ["0", "1", "2"]);
+        assert_eq!(table.rows, [[0.5, -1.0, 1e-3], [1.0, 2.0, 3.0]]);
+    }
+
+    #[test]
+    fn faults_name_line_and_column() {
+        for (text, expected) in [
+            (
+                "a,b\n",
+                "laps.of.mine.csv: no rows under the header; one for each lap is needed",
+            ),
+            (
+                "0.1,0.2\n0.3,0.4\n",
+                "laps.of.mine.csv:1: these look like the numbers of a lap; a line with the names of \
+                 the columns must come first",
+            ),
+            (
+                "a,b\n1,\n",
+                "laps.of.mine.csv:2: b: is empty; a number is needed here",
+            ),
+            (
+                "a,b\n1,2\n1,x\n",
+                "laps.of.mine.csv:3: b: `x` is not a finite number; leave the field empty if it is \
+                 missing",
+            ),
+            (
+                "a,b\n1,2,3\n",
+                "laps.of.mine.csv:2: 3 fields under a header of 2",
+            ),
+        ] {
+            assert_eq!(load(text).unwrap_err(), expected);
+        }
+    }
+}

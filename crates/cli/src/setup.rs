@@ -1,0 +1,212 @@
+//! From a configuration to what the simulator takes.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use anyhow::{Context, Result};
+use sim::{
+    Beam, CasterKind, Circuit, Drive, Machine, Model, Mount, Pattern, ReadingNoise, Response, Robot, RunRules, Scene,
+    Setting, Step, Streams, Vec2, WallRules,
+};
+use toml::Value;
+use track::{Course, Way};
+
+use crate::config::{self, Combine, Config, ControllerKind, Direction, ModelFile, SensorKind, WorldSource};
+
+/// A checked model on its circuit, ready to drive.
+#[derive(Debug, Clone)]
+pub(crate) struct Setup {
+    pub(crate) model: Model,
+    pub(crate) scene: Scene,
+}
+
+impl Setup {
+    /// The setup of a model file; `world` is that of `--world`.
+    pub(crate) fn load(file: &ModelFile, world: Option<&Path>, caster: Option<CasterKind>) -> Result<Self> {
+        let source = file.world(world)?;
+        let circuit = circuit(&source, file.config.run.gates)?;
+        Self::new(&file.config, circuit, caster).map_err(|error| locate(file, error))
+    }
+
+    /// The setup of a configuration on a circuit.
+    pub(crate) fn new(
+        config: &Config,
+        circuit: Arc<Circuit>,
+        caster: Option<CasterKind>,
+    ) -> Result<Self, sim::Error> {
+        let model = model(config)?;
+        let scene = Scene::new(circuit, &model, caster)?;
+        Ok(Self { model, scene })
+    }
+
+    /// Drives one run; `record` gets every step.
+    pub(crate) fn drive(
+        &self,
+        streams: Streams,
+        laps: usize,
+        record: impl FnMut(&Step),
+    ) -> Result<Drive, sim::Error> {
+        let world = self.scene.world(&self.model, streams.run as usize)?;
+        sim::drive(&world, streams, laps, record)
+    }
+}
+
+/// An error of the simulator with the place in the file where its key was set.
+fn locate(file: &ModelFile, error: sim::Error) -> anyhow::Error {
+    match error.key() {
+        Some(key) => file.located(key, &error),
+        None => error.into(),
+    }
+}
+
+/// The course of a world file with its gates.
+pub(crate) fn circuit(source: &WorldSource, gates: usize) -> Result<Arc<Circuit>> {
+    let course = course(source)?;
+    let circuit = Circuit::new(course, gates).with_context(|| source.label.clone())?;
+    Ok(Arc::new(circuit))
+}
+
+/// The course of a world file; an error says which line of it.
+pub(crate) fn course(source: &WorldSource) -> Result<Course> {
+    Course::from_toml(&source.text).map_err(|error| match error.line() {
+        Some(line) => anyhow::anyhow!("{}:{line}: {error}", source.label),
+        None => anyhow::anyhow!("{}: {error}", source.label),
+    })
+}
+
+/// The model that a configuration states.
+pub(crate) fn model(config: &Config) -> Result<Model, sim::Error> {
+    let model = Model {
+        machine: machine(config)?,
+        run: RunRules {
+            way: match config.run.direction {
+                Direction::Clockwise => Way::Forward,
+                Direction::CounterClockwise => Way::Backward,
+            },
+            control_step_s: config.controller.step_s,
+            physics_steps: config.run.physics_steps as u32,
+            start_offset_m: config.run.start_offset_m,
+            start_heading_rad: config.run.start_heading_rad,
+            patience_laps: config.run.patience_laps,
+        },
+        wall: WallRules { max_error_m: config.wall.max_error_m, thickness_m: config.wall.thickness_m },
+        effects: config.effect.iter().enumerate().map(|(i, e)| setting(i, e)).collect::<Result<_, _>>()?,
+    };
+    model.check()?;
+    Ok(model)
+}
+
+fn machine(config: &Config) -> Result<Machine, sim::Error> {
+    let config::Config { robot, sensor, controller, .. } = config;
+    let mount = |m: config::Mount| Mount { position: Vec2::new(m.x_m, m.y_m), angle_rad: m.angle_rad };
+    let (response, noise) = match sensor.kind {
+        SensorKind::Improved => {
+            let config::Improved { a_counts, d0_m, exponent, noise_fraction, noise_counts } = sensor.improved;
+            let noise = ReadingNoise { fraction: noise_fraction, counts: noise_counts };
+            (Response::Improved { a_counts, d0_m, exponent }, noise)
+        }
+        SensorKind::Original => {
+            let noise = ReadingNoise { fraction: sensor.original.noise_fraction, counts: 0.0 };
+            (Response::Table(sensor.original.table.clone()), noise)
+        }
+    };
+    let combine = match sensor.combine {
+        Combine::Responses => sim::Combine::Responses,
+        Combine::Distances => sim::Combine::Distances,
+    };
+    Ok(Machine {
+        robot: Robot {
+            body_radius_m: robot.body_radius_m,
+            axle_m: robot.axle_m,
+            wheel_speed_limit_m_s: robot.wheel_speed_limit_m_s,
+        },
+        mounts: sensor.mounts.map(mount),
+        range_m: sensor.range_m,
+        full_scale_counts: sensor.full_scale_counts,
+        response,
+        noise,
+        beam: Beam::cone(sensor.rays, sensor.half_angle_rad, combine)?,
+        controller: match controller.kind {
+            ControllerKind::Braitenberg => sim::Controller::Braitenberg {
+                speed_m_s: controller.speed_m_s,
+                gain_per_count: controller.gain_per_count,
+            },
+            ControllerKind::RuleBased => sim::Controller::RuleBased {
+                speed_m_s: controller.speed_m_s,
+                threshold_counts: controller.threshold_counts,
+            },
+        },
+        slip_level: config.slip.level,
+        camera_noise_m: config.camera.noise_m,
+    })
+}
+
+/// One `[[effect]]` table; `index` is its place in the file.
+fn setting(index: usize, effect: &config::Effect) -> Result<Setting, sim::Error> {
+    let invalid = |key: &str, reason: String| sim::Error::Invalid { key: format!("effect.{index}.{key}"), reason };
+    let spec = sim::find(&effect.kind).map_err(|error| invalid("kind", error.to_string()))?;
+    let by_time = effect.by == Some(config::Pattern::Time);
+    let slope_key = |param: &sim::Param| format!("{}_per_s", param.name);
+    for key in effect.parameters.keys() {
+        let known = |p: &sim::Param| p.name == key || by_time && slope_key(p) == *key;
+        if !spec.params.iter().any(known) {
+            let names: Vec<&str> = spec.params.iter().map(|p| p.name).collect();
+            return Err(invalid(key, format!("is no parameter of {}, which has {}", spec.name, names.join(", "))));
+        }
+    }
+    let value = |param: &sim::Param, value: &Value| {
+        number(param, value).map_err(|expected| invalid(param.name, format!("{value} given, {expected} expected")))
+    };
+    let get = |param: &sim::Param| match (effect.parameters.get(param.name), param.neutral) {
+        (Some(given), _) => Ok(given.clone()),
+        (None, Some(neutral)) => Ok(Value::Float(neutral)),
+        (None, None) => Err(invalid("kind", format!("{} needs `{}`", spec.name, param.name))),
+    };
+    let pattern = match effect.by {
+        None => Pattern::Constant(spec.params.iter().map(|p| value(p, &get(p)?)).collect::<Result<_, _>>()?),
+        Some(config::Pattern::Time) => Pattern::ByTime {
+            start: spec.params.iter().map(|p| value(p, &get(p)?)).collect::<Result<_, _>>()?,
+            per_s: spec
+                .params
+                .iter()
+                .map(|p| effect.parameters.get(&slope_key(p)).map_or(Ok(0.0), |v| value(p, v)))
+                .collect::<Result<_, _>>()?,
+        },
+        Some(config::Pattern::Run) => {
+            let given: Vec<Value> = spec.params.iter().map(get).collect::<Result<_, _>>()?;
+            let lengths = given.iter().filter_map(|v| v.as_array().map(Vec::len));
+            let runs = lengths.max().ok_or_else(|| invalid("by", "by run needs an array of values".into()))?;
+            let of_run = |run: usize| -> Result<Vec<f64>, sim::Error> {
+                spec.params
+                    .iter()
+                    .zip(&given)
+                    .map(|(p, v)| match v.as_array() {
+                        None => value(p, v),
+                        Some(list) => list.get(run).map_or_else(
+                            || Err(invalid(p.name, format!("has {} of {runs} values", list.len()))),
+                            |v| value(p, v),
+                        ),
+                    })
+                    .collect()
+            };
+            Pattern::ByRun((0..runs).map(of_run).collect::<Result<_, _>>()?)
+        }
+    };
+    Ok(Setting { spec, pattern })
+}
+
+/// A parameter's value as the number that the simulator takes, or what was expected.
+fn number(param: &sim::Param, value: &Value) -> Result<f64, String> {
+    match value {
+        Value::String(word) => param
+            .choices
+            .iter()
+            .position(|choice| choice == word)
+            .map(|index| index as f64)
+            .ok_or_else(|| format!("one of {}", param.choices.join(", "))),
+        Value::Integer(whole) if param.choices.is_empty() => Ok(*whole as f64),
+        Value::Float(number) if param.choices.is_empty() || param.neutral == Some(*number) => Ok(*number),
+        _ if param.choices.is_empty() => Err("a number".into()),
+        _ => Err(format!("one of {}", param.choices.join(", "))),
+    }
+}

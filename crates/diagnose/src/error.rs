@@ -1,0 +1,26 @@
+//! Why something cannot be fitted.
+
+/// Why something cannot be fitted.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// A pair that is no distance and reading.
+    #[error("distance {distance_m} m with reading {reading} is no measured pair: distances are finite and not negative, readings finite")]
+    Pair {
+        /// The distance, m.
+        distance_m: f64,
+        /// The reading, counts.
+        reading: f64,
+    },
+    /// Too few pairs for three parameters and an error.
+    #[error("{pairs} pairs with positive readings at {distances} distances do not determine a response: 5 pairs at 3 distances are needed")]
+    TooFewPairs {
+        /// Pairs with positive readings.
+        pairs: usize,
+        /// Different distances.
+        distances: usize,
+    },
+    /// Pairs that every response of the family fits alike.
+    #[error("the pairs do not determine a, d0 and p: measure below and above the distance where the reading falls to half")]
+    Undetermined,
+}

@@ -1,0 +1,199 @@
+//! Ray casting: eight rays that start close together against walls that do not move.
+//!
+//! All casters of ours use one intersection ([`crossing`]) and therefore agree bit for bit.
+
+mod bvh;
+mod cells;
+mod march;
+
+use track::Vec2;
+
+pub(crate) use cells::Cells;
+
+use crate::Walls;
+
+/// Rays that are cast together: one for each sensor.
+pub const LANES: usize = 8;
+
+/// Eight rays with unit directions, coordinate by coordinate so that they fill the processor's lanes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Rays {
+    /// Origins, m.
+    pub origin_x: [f64; LANES],
+    /// Origins, m.
+    pub origin_y: [f64; LANES],
+    /// Unit directions.
+    pub direction_x: [f64; LANES],
+    /// Unit directions.
+    pub direction_y: [f64; LANES],
+}
+
+impl Rays {
+    /// Eight rays from origins (m) and unit directions.
+    pub fn new(rays: [(Vec2, Vec2); LANES]) -> Self {
+        Self {
+            origin_x: rays.map(|(origin, _)| origin.x),
+            origin_y: rays.map(|(origin, _)| origin.y),
+            direction_x: rays.map(|(_, direction)| direction.x),
+            direction_y: rays.map(|(_, direction)| direction.y),
+        }
+    }
+
+    /// Origin of ray `i`, m.
+    pub fn origin(&self, i: usize) -> Vec2 {
+        Vec2::new(self.origin_x[i], self.origin_y[i])
+    }
+
+    /// Unit direction of ray `i`.
+    pub fn direction(&self, i: usize) -> Vec2 {
+        Vec2::new(self.direction_x[i], self.direction_y[i])
+    }
+}
+
+/// What eight rays hit.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Hits {
+    /// Distance along each ray to the nearest wall, m; infinite where there is none within the range.
+    pub distance_m: [f64; LANES],
+    /// The segment hit; meaningless where the distance is infinite.
+    pub segment: [u32; LANES],
+}
+
+impl Hits {
+    /// No wall anywhere.
+    pub const NONE: Self = Self { distance_m: [f64::INFINITY; LANES], segment: [0; LANES] };
+}
+
+/// Side and advance of a vertex as seen from a ray: the cross and the dot product of the ray's direction with the
+/// way from its origin to the vertex. Two neighbouring segments compute the same bits for the vertex they share, so no
+/// ray slips through a joint.
+#[inline(always)]
+fn sight(origin: (f64, f64), direction: (f64, f64), vertex: (f64, f64)) -> (f64, f64) {
+    let (x, y) = (vertex.0 - origin.0, vertex.1 - origin.1);
+    (direction.0 * y - direction.1 * x, direction.0 * x + direction.1 * y)
+}
+
+/// Distance along a ray to the segment between two vertices seen at `(side, advance)`, or infinity.
+///
+/// The ray crosses the segment's line where the side changes sign; the distance is interpolated between the two
+/// advances. A vertex exactly on the ray counts as on its left. A segment that lies along the ray is not hit itself:
+/// the ray sees the chain at the joint with the next segment that does not.
+#[inline(always)]
+fn crossing(from: (f64, f64), to: (f64, f64)) -> f64 {
+    let distance = from.1 + (to.1 - from.1) * (from.0 / (from.0 - to.0));
+    if ((from.0 >= 0.0) != (to.0 >= 0.0)) & (distance >= 0.0) { distance } else { f64::INFINITY }
+}
+
+/// Distance along the ray to the segment, m, or infinity: the one intersection that all casters of ours share.
+///
+/// ```
+/// use sim::{Vec2, segment_distance_m};
+/// let hit = segment_distance_m(Vec2::ZERO, Vec2::X, Vec2::new(0.1, -1.0), Vec2::new(0.1, 1.0));
+/// assert_eq!(hit, 0.1);
+/// ```
+#[inline]
+pub fn segment_distance_m(origin: Vec2, direction: Vec2, a: Vec2, b: Vec2) -> f64 {
+    let (origin, direction) = ((origin.x, origin.y), (direction.x, direction.y));
+    crossing(sight(origin, direction, (a.x, a.y)), sight(origin, direction, (b.x, b.y)))
+}
+
+/// The ways to cast rays.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum CasterKind {
+    /// A plain loop over all segments for each ray.
+    Brute,
+    /// The bounding volume hierarchy of parry2d.
+    Bvh,
+    /// For each cell of a coarse grid the runs of segments in the robot's reach, against eight rays at once.
+    Cells,
+    /// Each ray marches through a fine grid that knows how far the nearest wall is.
+    March,
+}
+
+impl CasterKind {
+    /// All kinds with the names a user gives them.
+    pub const NAMED: [(&'static str, Self); 4] =
+        [("brute", Self::Brute), ("bvh", Self::Bvh), ("cells", Self::Cells), ("march", Self::March)];
+
+    /// The quicker of our casters for this many segments within the reach of an average place.
+    fn for_walls(walls: &Walls) -> Self {
+        // Measured by benches/ray_cast.rs: the lanes win while a disc of the rays' reach holds few segments.
+        if walls.len() <= 600 { Self::Cells } else { Self::March }
+    }
+
+    /// The name a user gives this kind.
+    pub fn name(self) -> &'static str {
+        Self::NAMED.iter().find(|(_, kind)| *kind == self).map_or("", |(name, _)| name)
+    }
+}
+
+/// Walls prepared for one way of casting rays.
+#[derive(Debug, Clone)]
+pub struct Caster {
+    method: Method,
+    range_m: f64,
+}
+
+#[derive(Debug, Clone)]
+enum Method {
+    Brute,
+    Bvh(Box<bvh::Bvh>),
+    Cells(Cells),
+    March(march::March),
+}
+
+impl Caster {
+    /// Prepares the walls for rays of at most `range_m` that start within `spread_m` of the robot's centre; `None`
+    /// chooses the kind by the walls.
+    pub fn new(kind: Option<CasterKind>, walls: &Walls, range_m: f64, spread_m: f64) -> Self {
+        let kind = kind.unwrap_or_else(|| CasterKind::for_walls(walls));
+        let method = match kind {
+            CasterKind::Brute => Method::Brute,
+            CasterKind::Bvh => Method::Bvh(Box::new(bvh::Bvh::new(walls))),
+            CasterKind::Cells => Method::Cells(Cells::new(walls, range_m + spread_m)),
+            CasterKind::March => Method::March(march::March::new(walls, range_m)),
+        };
+        Self { method, range_m }
+    }
+
+    /// Which way of casting this is.
+    pub fn kind(&self) -> CasterKind {
+        match self.method {
+            Method::Brute => CasterKind::Brute,
+            Method::Bvh(_) => CasterKind::Bvh,
+            Method::Cells(_) => CasterKind::Cells,
+            Method::March(_) => CasterKind::March,
+        }
+    }
+
+    /// What the rays hit within the range. `center` is the robot's centre, `walls` those the caster was made for.
+    #[inline]
+    pub fn cast(&self, walls: &Walls, center: Vec2, rays: &Rays) -> Hits {
+        let mut hits = match &self.method {
+            Method::Brute => brute(walls, rays),
+            Method::Bvh(bvh) => bvh.cast(rays, self.range_m),
+            Method::Cells(cells) => cells.cast(walls, center, rays),
+            Method::March(march) => march.cast(walls, rays, self.range_m),
+        };
+        for distance in &mut hits.distance_m {
+            *distance = if *distance <= self.range_m { *distance } else { f64::INFINITY };
+        }
+        hits
+    }
+}
+
+/// The plain loop: every ray against every segment.
+fn brute(walls: &Walls, rays: &Rays) -> Hits {
+    let mut hits = Hits::NONE;
+    for i in 0..LANES {
+        let (origin, direction) = (rays.origin(i), rays.direction(i));
+        for (segment, a, b) in walls.segments() {
+            let distance = segment_distance_m(origin, direction, a, b);
+            if distance < hits.distance_m[i] {
+                hits.distance_m[i] = distance;
+                hits.segment[i] = segment as u32;
+            }
+        }
+    }
+    hits
+}

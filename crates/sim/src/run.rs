@@ -1,0 +1,374 @@
+//! One robot driving: sense, decide, act, move, observe.
+
+use std::sync::Arc;
+
+use track::{Lap, LapTracker, Vec2, Way};
+
+use crate::cast::{Hits, LANES, Rays};
+use crate::effects::{Active, Hit, Moment};
+use crate::noise::{Stream, Streams};
+use crate::sensor::Combine;
+use crate::world::{Geometry, World, altered};
+use crate::{Error, Machine, Pose, Readings, WheelSpeeds};
+
+/// What one control step tells: the row of a run's file.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Step {
+    /// Time since the run began, s.
+    pub time_s: f64,
+    /// The centre as the overhead camera sees it, m.
+    pub observed: Vec2,
+    /// The readings, counts.
+    pub readings: Readings,
+    /// The wheel speeds commanded from them, m/s.
+    pub command: WheelSpeeds,
+}
+
+/// Everything that changes while a robot drives.
+#[derive(Debug)]
+pub struct Run<'w> {
+    world: &'w World<'w>,
+    geometry: Arc<Geometry>,
+    machine: Machine,
+    sights: Vec<Sight>,
+    effects: Vec<Active>,
+    drifting: bool,
+    pose: Pose,
+    steps: u64,
+    next_gate: usize,
+    stretch: u64,
+    contacts: u64,
+    slip: Stream,
+    sense: Stream,
+    camera: Stream,
+}
+
+/// The rays that one ray of the beam makes on all eight sensors, in the body frame.
+#[derive(Debug, Clone, Copy)]
+struct Sight {
+    origin: [Vec2; LANES],
+    direction: [Vec2; LANES],
+    weight: f64,
+}
+
+impl<'w> Run<'w> {
+    /// A robot at its random start (on a random gate, a little beside its centre, a little turned).
+    ///
+    /// # Errors
+    /// An effect without values for this run.
+    pub fn new(world: &'w World<'w>, streams: Streams) -> Result<Self, Error> {
+        let mut start = streams.open("start");
+        let gates = &world.circuit().gates;
+        let gate = start.index(gates.len());
+        let (offset_m, turn_rad) =
+            (world.rules().start_offset_m * start.symmetric(), world.rules().start_heading_rad * start.symmetric());
+        let forward = world.forward(gate);
+        let center = gates[gate].center + gates[gate].left * offset_m;
+        let pose = Pose::new(center.x, center.y, forward.y.atan2(forward.x) + turn_rad);
+        let effects = Active::all(&world.model.effects, world.run)?;
+        let mut run = Self {
+            world,
+            geometry: Arc::clone(&world.geometry),
+            machine: world.machine.clone(),
+            sights: sights(&world.machine),
+            drifting: effects.iter().any(Active::drifts),
+            effects,
+            pose,
+            steps: 0,
+            next_gate: gate,
+            stretch: 0,
+            contacts: 0,
+            slip: streams.open("slip"),
+            sense: streams.open("sense"),
+            camera: streams.open("camera"),
+        };
+        run.pass_gate();
+        Ok(run)
+    }
+
+    /// The robot's true pose.
+    pub fn pose(&self) -> Pose {
+        self.pose
+    }
+
+    /// Physics steps so far in which the body touched a wall.
+    pub fn contacts(&self) -> u64 {
+        self.contacts
+    }
+
+    /// Drives for one control step.
+    pub fn step(&mut self) -> Step {
+        let time_s = self.steps as f64 * self.world.rules().control_step_s;
+        if self.drifting {
+            self.drift(time_s);
+        }
+        let mut now = Moment {
+            time_s,
+            step_s: self.world.rules().control_step_s,
+            pose: self.pose,
+            command: WheelSpeeds::default(),
+            gate: self.next_gate,
+        };
+        let observed = self.observe(&now);
+        let readings = self.sense(&now);
+        now.command = self.machine.robot.limit(self.machine.controller.command(&readings));
+        self.act(now);
+        self.steps += 1;
+        Step { time_s, observed, readings, command: now.command }
+    }
+
+    /// Brings the values that change in time, and what depends on them, up to date.
+    fn drift(&mut self, time_s: f64) {
+        self.effects.iter_mut().for_each(|active| active.advance(time_s));
+        self.machine = altered(&self.world.model.machine, &self.effects);
+        self.sights = sights(&self.machine);
+        // Walls are cut anew only a few times in a lap: they move by micrometres in that time.
+        const STEPS_BETWEEN_CUTS: u64 = 64;
+        if self.steps.is_multiple_of(STEPS_BETWEEN_CUTS) {
+            self.geometry = self.world.scene.geometry(&self.effects, &self.machine);
+        }
+    }
+
+    /// Where the camera sees the robot.
+    #[inline]
+    fn observe(&mut self, now: &Moment) -> Vec2 {
+        let seen = self
+            .effects
+            .iter()
+            .fold(self.pose.position, |position, active| active.effect.observed(&active.values, now, position));
+        let noise_m = self.machine.camera_noise_m;
+        let (x, y) = (self.camera.normal(), self.camera.normal());
+        seen + Vec2::new(x, y) * noise_m
+    }
+
+    /// The eight readings.
+    #[inline]
+    fn sense(&mut self, now: &Moment) -> Readings {
+        let mut readings = self.responses();
+        for active in &mut self.effects {
+            active.effect.readings(&active.values, now, &mut readings);
+        }
+        let noise = self.machine.noise;
+        for reading in &mut readings {
+            *reading += noise.deviation(*reading) * self.sense.normal();
+        }
+        for active in &mut self.effects {
+            active.effect.noisy_readings(&active.values, &mut readings);
+        }
+        let full_scale = self.machine.full_scale_counts;
+        readings.map(|reading| reading.clamp(0.0, full_scale))
+    }
+
+    /// The response of each sensor to what its rays meet.
+    #[inline]
+    fn responses(&self) -> Readings {
+        let machine = &self.machine;
+        let mut total = [0.0; LANES];
+        for sight in &self.sights {
+            let rays = self.rays(sight);
+            let hits = self.geometry.caster.cast(&self.geometry.walls, self.pose.position, &rays);
+            let values = match machine.beam.combine {
+                Combine::Responses => self.ray_responses(&rays, &hits),
+                Combine::Distances => hits.distance_m.map(|distance| distance.min(machine.range_m)),
+            };
+            for lane in 0..LANES {
+                total[lane] += sight.weight * values[lane];
+            }
+        }
+        match machine.beam.combine {
+            Combine::Responses => total,
+            // A mean that is as far as the range is of rays that all see nothing.
+            Combine::Distances => total
+                .map(|d| if d < machine.range_m * (1.0 - 1e-12) { machine.response.reading(d) } else { 0.0 }),
+        }
+    }
+
+    fn ray_responses(&self, rays: &Rays, hits: &Hits) -> Readings {
+        let machine = &self.machine;
+        let mut values =
+            hits.distance_m.map(|d| if d <= machine.range_m { machine.response.reading(d) } else { 0.0 });
+        if self.effects.iter().any(|active| active.effect.weighs_rays()) {
+            for lane in 0..LANES {
+                if values[lane] > 0.0 {
+                    values[lane] *= self.ray_factor(rays, hits, lane);
+                }
+            }
+        }
+        values
+    }
+
+    /// What the effects make of one ray's response.
+    fn ray_factor(&self, rays: &Rays, hits: &Hits, lane: usize) -> f64 {
+        let (walls, segment) = (&self.geometry.walls, hits.segment[lane] as usize);
+        let direction = rays.direction(lane);
+        let place = walls.place(segment, rays.origin(lane) + direction * hits.distance_m[lane]);
+        let hit = Hit {
+            sensor: lane,
+            distance_m: hits.distance_m[lane],
+            cos_incidence: walls.normal(segment).dot(direction).abs(),
+            place,
+            wall_length_m: self.world.circuit().course.wall(place.side).length_m(),
+        };
+        self.effects.iter().map(|active| active.effect.ray_factor(&active.values, &hit)).product()
+    }
+
+    /// Rays of the body frame in the world.
+    #[inline]
+    fn rays(&self, sight: &Sight) -> Rays {
+        let Pose { position, heading } = self.pose;
+        let mut rays = Rays {
+            origin_x: [0.0; LANES],
+            origin_y: [0.0; LANES],
+            direction_x: [0.0; LANES],
+            direction_y: [0.0; LANES],
+        };
+        for lane in 0..LANES {
+            let (origin, direction) = (sight.origin[lane], sight.direction[lane]);
+            rays.origin_x[lane] = position.x + (heading.x * origin.x - heading.y * origin.y);
+            rays.origin_y[lane] = position.y + (heading.y * origin.x + heading.x * origin.y);
+            rays.direction_x[lane] = heading.x * direction.x - heading.y * direction.y;
+            rays.direction_y[lane] = heading.y * direction.x + heading.x * direction.y;
+        }
+        rays
+    }
+
+    /// The physics steps of one control step.
+    #[inline]
+    fn act(&mut self, mut now: Moment) {
+        let rules = self.world.rules();
+        let step_s = rules.control_step_s / f64::from(rules.physics_steps);
+        let start_s = now.time_s;
+        now.step_s = step_s;
+        for k in 0..rules.physics_steps {
+            now.time_s = start_s + f64::from(k) * step_s;
+            now.pose = self.pose;
+            let ground = self.ground(&now);
+            let mut twist = self.machine.robot.twist(ground);
+            for active in &mut self.effects {
+                twist = active.effect.twist(&active.values, &now, twist);
+            }
+            self.pose = self.pose.advance(twist, step_s);
+            for active in &self.effects {
+                self.pose.position += active.effect.drift_m_s(&active.values, &now) * step_s;
+            }
+            self.touch();
+            self.pass_gate();
+        }
+    }
+
+    /// Speeds of the wheels over the ground.
+    #[inline]
+    fn ground(&mut self, now: &Moment) -> WheelSpeeds {
+        let mut wheels = now.command;
+        let mut draws = [self.slip.symmetric(), self.slip.symmetric()];
+        for active in &mut self.effects {
+            wheels = active.effect.drive(&active.values, now, wheels);
+            draws = active.effect.slip(&active.values, draws);
+        }
+        let level = self.machine.slip_level;
+        let mut ground = WheelSpeeds {
+            left_m_s: wheels.left_m_s * (1.0 + level * draws[0]),
+            right_m_s: wheels.right_m_s * (1.0 + level * draws[1]),
+        };
+        for active in &mut self.effects {
+            ground = active.effect.ground(&active.values, now, ground);
+        }
+        ground
+    }
+
+    /// Moves the centre away from walls that the body overlaps; the heading stays.
+    #[inline]
+    fn touch(&mut self) {
+        // Two walls at an acute corner push in turn; a body that fits is free after a few.
+        const MOST_PUSHES: usize = 32;
+        let radius_m = self.machine.robot.body_radius_m;
+        for push in 0..MOST_PUSHES {
+            let Some(point) = self.geometry.contact.nearest_within(&self.geometry.walls, self.pose.position, radius_m)
+            else {
+                return;
+            };
+            self.contacts += u64::from(push == 0);
+            let away = (self.pose.position - point).try_normalize().unwrap_or(-self.pose.heading);
+            // A hair more than the radius, so that rounding does not make it overlap again.
+            self.pose.position = point + away * (radius_m * (1.0 + 1e-12));
+        }
+    }
+
+    /// Starts the random streams afresh when the true position passes the next gate.
+    #[inline]
+    fn pass_gate(&mut self) {
+        let gates = &self.world.circuit().gates;
+        let gate = &gates[self.next_gate];
+        let way = self.pose.position - gate.center;
+        if way.dot(self.world.forward(self.next_gate)) < 0.0 || way.length_squared() > 0.04 {
+            return;
+        }
+        let count = gates.len();
+        self.next_gate = match self.world.rules().way {
+            Way::Forward => (self.next_gate + 1) % count,
+            Way::Backward => (self.next_gate + count - 1) % count,
+        };
+        self.stretch += 1;
+        self.slip.enter(self.stretch);
+        self.sense.enter(self.stretch);
+        self.camera.enter(self.stretch);
+    }
+}
+
+/// The beam of all sensors, ray by ray.
+fn sights(machine: &Machine) -> Vec<Sight> {
+    let axes = machine.mounts.map(|mount| Vec2::new(mount.angle_rad.cos(), mount.angle_rad.sin()));
+    let sight = |&(turn, weight): &(Vec2, f64)| Sight {
+        origin: machine.mounts.map(|mount| mount.position),
+        direction: axes.map(|axis| axis.rotate(turn)),
+        weight,
+    };
+    machine.beam.rays().iter().map(sight).collect()
+}
+
+/// The laps of one run.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Drive {
+    /// Whole laps after the first, in order; fewer than asked for if the run timed out.
+    pub laps: Vec<Lap>,
+    /// Physics steps in which the body touched a wall.
+    pub contacts: u64,
+    /// Whether the run ended because gate 0 was not crossed for too long.
+    pub timed_out: bool,
+    /// Control steps driven.
+    pub steps: u64,
+}
+
+/// Drives until `laps` whole laps after the first are complete, or until the model's patience ends; `record` gets every step.
+///
+/// # Errors
+/// An effect without values for this run.
+pub fn drive(
+    world: &World<'_>,
+    streams: Streams,
+    laps: usize,
+    mut record: impl FnMut(&Step),
+) -> Result<Drive, Error> {
+    let mut run = Run::new(world, streams)?;
+    let mut tracker = LapTracker::new(&world.circuit().gates, world.rules().way);
+    let mut done: Vec<Lap> = Vec::with_capacity(laps + 1);
+    let patience_s = world.rules().patience_laps * world.nominal_lap_s();
+    let mut latest_s = 0.0;
+    let timed_out = loop {
+        let step = run.step();
+        record(&step);
+        if let Some(lap) = tracker.push(step.time_s, step.observed) {
+            latest_s = step.time_s;
+            done.push(lap);
+            if done.len() > laps {
+                break false;
+            }
+        }
+        if step.time_s - latest_s > patience_s {
+            break true;
+        }
+    };
+    // "As the first lap was much influenced by the initial position of the robot, it was always removed."
+    let kept = done.split_off(done.len().min(1));
+    Ok(Drive { laps: kept, contacts: run.contacts, timed_out, steps: run.steps })
+}

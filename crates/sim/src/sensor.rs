@@ -1,0 +1,208 @@
+//! Infra-red proximity sensors: where they sit, what they answer to a distance, how much they vary.
+
+use track::Vec2;
+
+use crate::Error;
+use crate::cast::LANES;
+
+/// The readings of S0 to S7, ADC counts.
+pub type Readings = [f64; LANES];
+
+/// Place and direction of a sensor on the robot.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Mount {
+    /// Where the ray starts, in the body frame (x forward, y left), m.
+    pub position: Vec2,
+    /// Where the ray goes, counter-clockwise from straight ahead, rad.
+    pub angle_rad: f64,
+}
+
+/// Reading against distance, before noise.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Response {
+    /// a / (1 + (d / d0)^p): the improved model of Fig. 8.
+    Improved {
+        /// Reading at no distance, counts.
+        a_counts: f64,
+        /// Distance at which half of it is left, m.
+        d0_m: f64,
+        /// Exponent.
+        exponent: f64,
+    },
+    /// Straight between the rows of a table of (distance m, reading counts), held at its ends: the original model of Fig. 8.
+    Table(Vec<[f64; 2]>),
+}
+
+impl Response {
+    /// The reading at a distance in metres, counts.
+    ///
+    /// ```
+    /// use sim::Response;
+    /// let original = Response::Table(vec![[0.0, 3800.0], [0.1, 300.0]]);
+    /// assert_eq!(original.reading(0.05), 2050.0);
+    /// ```
+    pub fn reading(&self, distance_m: f64) -> f64 {
+        match self {
+            Self::Improved { a_counts, d0_m, exponent } => {
+                a_counts / (1.0 + power(distance_m / d0_m, *exponent))
+            }
+            Self::Table(rows) => interpolate(rows, distance_m),
+        }
+    }
+
+    /// The response taken at `factor` times the distance.
+    pub fn at_scaled_distance(&self, factor: f64) -> Self {
+        match self {
+            Self::Improved { a_counts, d0_m, exponent } => {
+                Self::Improved { a_counts: *a_counts, d0_m: d0_m / factor, exponent: *exponent }
+            }
+            Self::Table(rows) => Self::Table(rows.iter().map(|[d, reading]| [d / factor, *reading]).collect()),
+        }
+    }
+
+    /// The response with its exponent times `factor`; a table has none and stays.
+    pub fn with_scaled_exponent(&self, factor: f64) -> Self {
+        match self {
+            Self::Improved { a_counts, d0_m, exponent } => {
+                Self::Improved { a_counts: *a_counts, d0_m: *d0_m, exponent: exponent * factor }
+            }
+            Self::Table(_) => self.clone(),
+        }
+    }
+}
+
+/// x^p for x >= 0.
+#[inline]
+fn power(x: f64, p: f64) -> f64 {
+    if x > 0.0 { (p * x.ln()).exp() } else { 0.0 }
+}
+
+fn interpolate(rows: &[[f64; 2]], x: f64) -> f64 {
+    let above = rows.partition_point(|row| row[0] < x);
+    match (above.checked_sub(1).and_then(|i| rows.get(i)), rows.get(above)) {
+        (Some([x0, y0]), Some([x1, y1])) => y0 + (y1 - y0) * (x - x0) / (x1 - x0),
+        (None, Some([_, y])) | (Some([_, y]), None) => *y,
+        (None, None) => 0.0,
+    }
+}
+
+/// Standard deviation of a reading: sqrt((fraction * reading)^2 + counts^2).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ReadingNoise {
+    /// Share of the reading.
+    pub fraction: f64,
+    /// What is there without a reading, counts.
+    pub counts: f64,
+}
+
+impl ReadingNoise {
+    /// The standard deviation of one reading, counts.
+    #[inline]
+    pub fn deviation(&self, reading: f64) -> f64 {
+        let relative = self.fraction * reading;
+        (relative * relative + self.counts * self.counts).sqrt()
+    }
+}
+
+/// How the rays of one sensor become one reading.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Combine {
+    /// Weighted mean of the responses of its rays.
+    Responses,
+    /// Response of the weighted mean of its distances, as Webots does; a ray that sees no wall counts as the range.
+    Distances,
+}
+
+/// A sensor's field of view as rays about its axis.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Beam {
+    /// Directions from the axis as unit vectors (cos, sin), with their weights, which sum to 1.
+    rays: Vec<(Vec2, f64)>,
+    /// How the rays become one reading.
+    pub combine: Combine,
+}
+
+impl Beam {
+    /// One ray along the axis.
+    pub fn single() -> Self {
+        Self { rays: vec![(Vec2::X, 1.0)], combine: Combine::Responses }
+    }
+
+    /// `count` rays at equal steps over the cone of `half_angle_rad` to either side of the axis, weighted by
+    /// cos(pi/2 * angle / half_angle) at the middle of each ray's share of the cone: full on the axis, nothing at the
+    /// edge. One ray, or no angle, is [`Beam::single`].
+    ///
+    /// # Errors
+    /// A count of 0, or an angle outside [0, pi/2].
+    pub fn cone(count: usize, half_angle_rad: f64, combine: Combine) -> Result<Self, Error> {
+        if count == 0 {
+            return Err(Error::OutOfRange { key: "sensor.rays".into(), value: 0.0, low: 1.0, high: f64::INFINITY });
+        }
+        check("sensor.half_angle_rad", half_angle_rad, 0.0, std::f64::consts::FRAC_PI_2)?;
+        if count == 1 || half_angle_rad == 0.0 {
+            return Ok(Self { combine, ..Self::single() });
+        }
+        let share = |i: usize| (2.0 * i as f64 + 1.0) / count as f64 - 1.0; // in (-1, 1)
+        let weight = |i: usize| (std::f64::consts::FRAC_PI_2 * share(i)).cos();
+        let total: f64 = (0..count).map(weight).sum();
+        let ray = |i: usize| {
+            let angle = half_angle_rad * share(i);
+            (Vec2::new(angle.cos(), angle.sin()), weight(i) / total)
+        };
+        Ok(Self { rays: (0..count).map(ray).collect(), combine })
+    }
+
+    /// Directions from the axis as (cos, sin) with their weights.
+    pub fn rays(&self) -> &[(Vec2, f64)] {
+        &self.rays
+    }
+}
+
+/// Refuses a number outside [low, high], NaN included.
+pub(crate) fn check(key: &str, value: f64, low: f64, high: f64) -> Result<(), Error> {
+    if value >= low && value <= high { Ok(()) } else { Err(Error::OutOfRange { key: key.into(), value, low, high }) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const IMPROVED: Response = Response::Improved { a_counts: 4202.93, d0_m: 0.005_219_53, exponent: 1.572_816_92 };
+
+    #[test]
+    fn improved_response_by_hand() {
+        assert_eq!(IMPROVED.reading(0.0), 4202.93);
+        assert!((IMPROVED.reading(0.005_219_53) - 0.5 * 4202.93).abs() < 1e-9);
+        let far = 4202.93 / (1.0 + (0.05_f64 / 0.005_219_53).powf(1.572_816_92));
+        assert!((IMPROVED.reading(0.05) / far - 1.0).abs() < 1e-13);
+    }
+
+    #[test]
+    fn original_response_is_a_line() {
+        let original = Response::Table(vec![[0.0, 3800.0], [0.1, 300.0]]);
+        for (d, reading) in [(0.0, 3800.0), (0.1, 300.0), (0.025, 2925.0)] {
+            assert!((original.reading(d) - reading).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn scaled_distance_is_the_response_at_the_scaled_distance() {
+        for response in [IMPROVED, Response::Table(vec![[0.0, 3800.0], [0.1, 300.0]])] {
+            let scaled = response.at_scaled_distance(1.3).reading(0.04);
+            assert!((scaled / response.reading(1.3 * 0.04) - 1.0).abs() < 1e-13);
+        }
+    }
+
+    #[test]
+    fn beam_is_symmetric_and_its_weights_sum_to_one() {
+        for count in [2, 3, 7, 100] {
+            let beam = Beam::cone(count, 0.3, Combine::Responses).unwrap();
+            let total: f64 = beam.rays().iter().map(|(_, w)| w).sum();
+            let lean: f64 = beam.rays().iter().map(|(d, w)| w * d.y).sum();
+            assert!((total - 1.0).abs() < 1e-12 && lean.abs() < 1e-12);
+        }
+        assert_eq!(Beam::cone(9, 0.0, Combine::Responses).unwrap(), Beam::single());
+        assert!(Beam::cone(0, 0.1, Combine::Responses).is_err());
+        assert!(Beam::cone(3, f64::NAN, Combine::Responses).is_err());
+    }
+}

@@ -1,0 +1,156 @@
+//! The straight pieces that rays hit and the body touches.
+
+use track::{Chain, Side, Vec2};
+
+/// Where on a wall a point lies.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WallPlace {
+    /// Which wall.
+    pub side: Side,
+    /// Fraction of the exact wall's length from its first joint in driving direction, in [0, 1].
+    pub fraction: f64,
+}
+
+/// What is remembered of a straight piece: the wall and the stretch of it that the piece stands for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Piece {
+    side: Side,
+    fractions: [f64; 2],
+}
+
+/// All walls as straight pieces: closed outlines of vertices, each joined to the next.
+///
+/// Vertex `i` and vertex `i + 1` of one outline are segment `i`; the first vertex of an outline is repeated as its
+/// last, so a run of neighbouring segments is a run of neighbouring vertices. The numbers of the last vertices are
+/// skipped: no segment has them.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Walls {
+    x_m: Vec<f64>,
+    y_m: Vec<f64>,
+    pieces: Vec<Option<Piece>>,
+}
+
+impl Walls {
+    /// The walls of two closed chains, as lines or, for a thickness above zero, as boxes of that thickness about
+    /// every piece of a chain (as in Webots: the boxes overlap at the joints, and their corners are not mitred).
+    pub fn new(outer: &Chain, inner: &Chain, thickness_m: f64) -> Self {
+        let mut walls = Self::default();
+        for (side, chain) in [(Side::Outer, outer), (Side::Inner, inner)] {
+            if thickness_m > 0.0 {
+                walls.push_boxes(side, chain, 0.5 * thickness_m);
+            } else {
+                walls.push_outline(side, chain.segments().map(|(a, b)| (a.position, [a.fraction, b.fraction])));
+            }
+        }
+        walls
+    }
+
+    /// Walls from bare outlines, each closed by itself; all belong to the outer wall.
+    pub fn from_outlines(outlines: &[Vec<Vec2>]) -> Self {
+        let mut walls = Self::default();
+        for outline in outlines {
+            let count = outline.len() as f64;
+            walls.push_outline(
+                Side::Outer,
+                outline.iter().enumerate().map(|(i, &p)| (p, [i as f64 / count, (i + 1) as f64 / count])),
+            );
+        }
+        walls
+    }
+
+    fn push_outline(&mut self, side: Side, vertices: impl Iterator<Item = (Vec2, [f64; 2])>) {
+        let first = self.x_m.len();
+        for (position, mut fractions) in vertices {
+            if fractions[1] < fractions[0] {
+                fractions[1] += 1.0; // the piece that closes the wall
+            }
+            self.x_m.push(position.x);
+            self.y_m.push(position.y);
+            self.pieces.push(Some(Piece { side, fractions }));
+        }
+        if self.x_m.len() > first {
+            self.x_m.push(self.x_m[first]);
+            self.y_m.push(self.y_m[first]);
+            self.pieces.push(None);
+        }
+    }
+
+    fn push_boxes(&mut self, side: Side, chain: &Chain, half_m: f64) {
+        for (a, b) in chain.segments() {
+            let Some(along) = (b.position - a.position).try_normalize() else { continue };
+            let left = along.perp() * half_m;
+            let (from, to) = (a.fraction, b.fraction);
+            let corners = [
+                (a.position + left, [from, to]),
+                (b.position + left, [to, to]),
+                (b.position - left, [to, from]),
+                (a.position - left, [from, from]),
+            ];
+            self.push_outline(side, corners.into_iter());
+        }
+    }
+
+    /// Number of straight pieces.
+    pub fn len(&self) -> usize {
+        self.pieces.iter().flatten().count()
+    }
+
+    /// Whether there is no wall at all.
+    pub fn is_empty(&self) -> bool {
+        self.x_m.is_empty()
+    }
+
+    /// The numbers of all segments with their ends, m.
+    pub fn segments(&self) -> impl Iterator<Item = (usize, Vec2, Vec2)> + '_ {
+        (0..self.pieces.len()).filter(|&i| self.pieces[i].is_some()).map(|i| (i, self.vertex(i), self.vertex(i + 1)))
+    }
+
+    /// Vertex `i`, m.
+    #[inline]
+    pub fn vertex(&self, i: usize) -> Vec2 {
+        Vec2::new(self.x_m[i], self.y_m[i])
+    }
+
+    /// The coordinates of the vertices, m, one list each.
+    #[inline]
+    pub(crate) fn coordinates_m(&self) -> (&[f64], &[f64]) {
+        (&self.x_m, &self.y_m)
+    }
+
+    /// Whether vertex `i` and the next are a segment.
+    #[inline]
+    pub(crate) fn is_segment(&self, i: usize) -> bool {
+        self.pieces[i].is_some()
+    }
+
+    /// Unit vector across a segment, to the left of its direction.
+    pub fn normal(&self, segment: usize) -> Vec2 {
+        (self.vertex(segment + 1) - self.vertex(segment)).normalize_or_zero().perp()
+    }
+
+    /// The place on the exact wall that a point of a segment stands for.
+    pub fn place(&self, segment: usize, point: Vec2) -> WallPlace {
+        let piece = self.pieces[segment].expect("a caster returns numbers of segments");
+        let (a, b) = (self.vertex(segment), self.vertex(segment + 1));
+        let along = ((point - a).dot(b - a) / (b - a).length_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
+        let [from, to] = piece.fractions;
+        WallPlace { side: piece.side, fraction: (from + along * (to - from)).rem_euclid(1.0) }
+    }
+
+    /// Lower left and upper right corner of everything, m.
+    pub(crate) fn bounds_m(&self) -> (Vec2, Vec2) {
+        let start = (Vec2::splat(f64::INFINITY), Vec2::splat(f64::NEG_INFINITY));
+        (0..self.x_m.len()).map(|i| self.vertex(i)).fold(start, |(low, high), p| (low.min(p), high.max(p)))
+    }
+}
+
+/// The point of the segment from `a` to `b` that is nearest to `p`.
+#[inline]
+pub(crate) fn nearest_on_segment(a: Vec2, b: Vec2, p: Vec2) -> Vec2 {
+    let along = b - a;
+    let length2 = along.length_squared();
+    if length2 == 0.0 {
+        return a;
+    }
+    a + along * ((p - a).dot(along) / length2).clamp(0.0, 1.0)
+}

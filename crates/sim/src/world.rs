@@ -1,0 +1,219 @@
+//! What never changes while a robot drives: threads share it.
+
+use std::sync::Arc;
+
+use track::{Chain, Course, Gates, Side, Vec2, Vertex, Way};
+
+use crate::cast::{Caster, CasterKind, Cells};
+use crate::effects::Active;
+use crate::{Error, Machine, Model, RunRules, WallPlace, WallRules, Walls};
+
+/// A course with its gates.
+#[derive(Debug, Clone)]
+pub struct Circuit {
+    /// The walls.
+    pub course: Course,
+    /// Where laps are sampled.
+    pub gates: Gates,
+}
+
+impl Circuit {
+    /// The course with `count` gates across it.
+    ///
+    /// # Errors
+    /// Gates that cross each other, or too few.
+    pub fn new(course: Course, count: usize) -> Result<Self, Error> {
+        let gates = course.gates(count)?;
+        Ok(Self { course, gates })
+    }
+}
+
+/// Walls cut into pieces, and what is prepared for casting rays at them and for touching them.
+#[derive(Debug)]
+pub(crate) struct Geometry {
+    pub(crate) walls: Walls,
+    pub(crate) caster: Caster,
+    pub(crate) contact: Cells,
+}
+
+impl Geometry {
+    fn new(walls: Walls, kind: Option<CasterKind>, machine: &Machine) -> Self {
+        let spread_m = machine.mounts.iter().map(|mount| mount.position.length()).fold(0.0, f64::max);
+        let caster = Caster::new(kind, &walls, machine.range_m, spread_m + 1e-9);
+        let contact = Cells::new(&walls, machine.robot.body_radius_m);
+        Self { walls, caster, contact }
+    }
+}
+
+/// A circuit whose walls are cut: made once, and the ground for every variant of a model.
+#[derive(Debug, Clone)]
+pub struct Scene {
+    circuit: Arc<Circuit>,
+    rules: WallRules,
+    kind: Option<CasterKind>,
+    outer: Chain,
+    inner: Chain,
+    range_m: f64,
+    body_radius_m: f64,
+    declared: Arc<Geometry>,
+}
+
+impl Scene {
+    /// Cuts the circuit's walls as the model says. `caster` forces a way of casting rays.
+    ///
+    /// # Errors
+    /// A model out of range, walls that cannot be cut, a corridor too narrow for the robot.
+    pub fn new(circuit: Arc<Circuit>, model: &Model, caster: Option<CasterKind>) -> Result<Self, Error> {
+        model.check()?;
+        let corridor = circuit.course.corridor_m();
+        let body_m = 2.0 * model.machine.robot.body_radius_m;
+        if corridor.narrowest_m - model.wall.thickness_m <= body_m {
+            let at = corridor.narrowest_at;
+            return Err(Error::TooNarrow { narrowest_m: corridor.narrowest_m, x_m: at.x, y_m: at.y, body_m });
+        }
+        let outer = circuit.course.outer.flatten(model.wall.max_error_m)?;
+        let inner = circuit.course.inner.flatten(model.wall.max_error_m)?;
+        let walls = Walls::new(&outer, &inner, model.wall.thickness_m);
+        let declared = Arc::new(Geometry::new(walls, caster, &model.machine));
+        let Machine { range_m, robot, .. } = &model.machine;
+        let (range_m, body_radius_m) = (*range_m, robot.body_radius_m);
+        Ok(Self { circuit, rules: model.wall, kind: caster, outer, inner, range_m, body_radius_m, declared })
+    }
+
+    /// The course and its gates.
+    pub fn circuit(&self) -> &Circuit {
+        &self.circuit
+    }
+
+    /// The straight pieces without effects.
+    pub fn walls(&self) -> &Walls {
+        &self.declared.walls
+    }
+
+    /// The way rays are cast here.
+    pub fn caster(&self) -> &Caster {
+        &self.declared.caster
+    }
+
+    /// What run number `run` of a model drives in. The model must have the wall rules that the scene was made for.
+    ///
+    /// # Errors
+    /// A model out of range, other wall rules, an effect without values for this run.
+    pub fn world(&self, model: &Model, run: usize) -> Result<World<'_>, Error> {
+        model.check()?;
+        if model.wall != self.rules || model.machine.robot.body_radius_m > self.body_radius_m {
+            return Err(Error::Invalid {
+                key: "wall".into(),
+                reason: "differs from the walls that the scene was cut for".into(),
+            });
+        }
+        let effects = Active::all(&model.effects, run)?;
+        let machine = altered(&model.machine, &effects);
+        let geometry = self.geometry(&effects, &machine);
+        Ok(World { scene: self, model: model.clone(), run, machine, geometry })
+    }
+
+    /// The walls as the effects move them.
+    pub(crate) fn geometry(&self, effects: &[Active], machine: &Machine) -> Arc<Geometry> {
+        let outer = self.moved(Side::Outer, effects);
+        let inner = self.moved(Side::Inner, effects);
+        if outer.is_none() && inner.is_none() && machine.range_m <= self.range_m {
+            return Arc::clone(&self.declared);
+        }
+        let (outer, inner) = (outer.as_ref().unwrap_or(&self.outer), inner.as_ref().unwrap_or(&self.inner));
+        Arc::new(Geometry::new(Walls::new(outer, inner, self.rules.thickness_m), self.kind, machine))
+    }
+
+    /// One wall's chain with its vertices moved, or `None` where nothing moves it.
+    fn moved(&self, side: Side, effects: &[Active]) -> Option<Chain> {
+        let wall = self.circuit.course.wall(side);
+        let length_m = wall.length_m();
+        let place = |fraction: f64| WallPlace { side, fraction };
+        let displacement_m = |vertex: &Vertex| -> f64 {
+            let at = place(vertex.fraction);
+            effects.iter().map(|active| active.effect.displacement_m(&active.values, at, length_m)).sum()
+        };
+        let divides = |a: &Vertex, b: &Vertex| {
+            let piece = (place(a.fraction), place(b.fraction));
+            effects.iter().any(|active| active.effect.divides(&active.values, piece, length_m))
+        };
+        let chain = if side == Side::Outer { &self.outer } else { &self.inner };
+        let mut vertices = Vec::with_capacity(chain.vertices.len());
+        for (a, b) in chain.segments() {
+            vertices.push(*a);
+            if divides(a, b) {
+                let span = (b.fraction - a.fraction).rem_euclid(1.0);
+                vertices.extend((1..PARTS).map(|i| {
+                    let share = f64::from(i) / f64::from(PARTS);
+                    let fraction = (a.fraction + share * span).rem_euclid(1.0);
+                    let position = a.position.lerp(b.position, share);
+                    Vertex { position, left_normal: wall.left_normal(fraction), fraction }
+                }));
+            }
+        }
+        let moves: Vec<f64> = vertices.iter().map(displacement_m).collect();
+        if moves.iter().all(|&m| m == 0.0) {
+            return None;
+        }
+        for (vertex, m) in vertices.iter_mut().zip(moves) {
+            vertex.position += vertex.left_normal * m;
+        }
+        Some(Chain { vertices })
+    }
+}
+
+/// Pieces that a local displacement reaches are first divided into this many.
+const PARTS: u32 = 8;
+
+/// The machine with the effects' constants.
+pub(crate) fn altered(machine: &Machine, effects: &[Active]) -> Machine {
+    let mut machine = machine.clone();
+    for active in effects {
+        active.effect.machine(&active.values, &mut machine);
+    }
+    machine
+}
+
+/// What one run drives in.
+#[derive(Debug)]
+pub struct World<'s> {
+    pub(crate) scene: &'s Scene,
+    pub(crate) model: Model,
+    pub(crate) run: usize,
+    /// The machine at the run's start.
+    pub(crate) machine: Machine,
+    pub(crate) geometry: Arc<Geometry>,
+}
+
+impl World<'_> {
+    /// The course and its gates.
+    pub fn circuit(&self) -> &Circuit {
+        self.scene.circuit()
+    }
+
+    /// How runs begin, tick and end.
+    pub fn rules(&self) -> &RunRules {
+        &self.model.run
+    }
+
+    /// The straight pieces that rays hit.
+    pub fn walls(&self) -> &Walls {
+        &self.geometry.walls
+    }
+
+    /// The way rays are cast here.
+    pub fn caster(&self) -> &Caster {
+        &self.geometry.caster
+    }
+
+    /// Time of a lap along the midline at the controller's speed, s.
+    pub fn nominal_lap_s(&self) -> f64 {
+        self.circuit().gates.midline_length_m() / self.machine.controller.speed_m_s()
+    }
+
+    /// Unit vector in which this run crosses a gate.
+    pub(crate) fn forward(&self, gate: usize) -> Vec2 {
+        let forward = self.circuit().gates[gate].forward();
+        if self.model.run.way == Way::Forward { forward } else { -forward }
+    }
+}
