@@ -221,7 +221,6 @@ fn two_maps() -> Figure {
         columns: 2,
         share: Share::Y,
         legend: Side::Below,
-        ..Figure::default()
     }
 }
 
@@ -284,6 +283,7 @@ fn clusters() -> Figure {
             y: Axis::linear("mode 2, m (12.8 %)"),
             marks: marks.collect(),
             size_px: [480.0, 360.0],
+            legend: Legend::Own(Side::Right),
             ..Panel::default()
         }],
         ..Figure::default()
@@ -476,9 +476,9 @@ fn scaling() -> Figure {
                 "",
                 style,
                 Shape::Notes(vec![Note {
-                    at: [10_000.0, time(10_000.0)],
+                    at: [3000.0, 0.6 * time(3000.0)],
                     text: format!("slope {slope:.2}"),
-                    anchor: Anchor::Above,
+                    anchor: Anchor::Below,
                 }]),
             ),
         ]
@@ -707,11 +707,6 @@ fn sweep() -> Figure {
             }
         })
         .collect();
-    let notes = cells((5, 6)).map(|(row, column)| Note {
-        at: [column as f64, row as f64],
-        text: format!("{:.1}", value(row, column)),
-        anchor: Anchor::Center,
-    });
     Figure {
         title: "Distance over two parameters".into(),
         description: "The distance is least near the declared values.".into(),
@@ -725,18 +720,16 @@ fn sweep() -> Figure {
                 "wall tolerance, m",
                 ["0.001", "0.002", "0.005", "0.01", "0.05"],
             ),
-            marks: vec![
-                Mark::new(
-                    "",
-                    Style::default(),
-                    Shape::Cells(Grid {
-                        x_edges: edges(6),
-                        y_edges: edges(5),
-                        values,
-                    }),
-                ),
-                Mark::new("", Style::default(), Shape::Notes(notes.collect())),
-            ],
+            marks: vec![Mark::new(
+                "",
+                Style::default(),
+                Shape::Cells(Grid {
+                    x_edges: edges(6),
+                    y_edges: edges(5),
+                    values,
+                    decimals: Some(1),
+                }),
+            )],
             colors: Some(ColorScale {
                 label: "inter-cluster distance".into(),
                 ..ColorScale::default()
@@ -839,6 +832,5 @@ fn shared() -> Figure {
         columns: 3,
         share: Share::Both,
         legend: Side::Below,
-        ..Figure::default()
     }
 }

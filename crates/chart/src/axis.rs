@@ -79,9 +79,10 @@ impl Axis {
         }
     }
 
-    /// The range to show: the axis's own, that of its categories, or that of the values with a margin.
+    /// The range to show: the one given, that of its categories, or that of the values with a margin.
     pub(crate) fn resolve(
         &self,
+        given: Option<[f64; 2]>,
         reach: &Reach,
         panel: usize,
         axis: AxisName,
@@ -90,7 +91,7 @@ impl Axis {
             let value = reach.low;
             return Err(Error::NotPositive { panel, axis, value });
         }
-        match (self.range, &self.ticks) {
+        match (given, &self.ticks) {
             (Some([low, high]), _) => self.checked(low, high, panel, axis),
             (None, Ticks::Categories(names)) if !names.is_empty() => {
                 Ok([-0.5, names.len() as f64 - 0.5])
@@ -266,7 +267,7 @@ mod tests {
     #[test]
     fn values_get_a_margin() {
         let range = Axis::default()
-            .resolve(&reach(&[0.0, 10.0]), 1, AxisName::X)
+            .resolve(None, &reach(&[0.0, 10.0]), 1, AxisName::X)
             .unwrap();
         assert!(
             (range[0] + 0.4).abs() < 1e-12 && (range[1] - 10.4).abs() < 1e-12,
@@ -278,12 +279,12 @@ mod tests {
     fn a_single_value_still_has_a_range() {
         assert_eq!(
             Axis::default()
-                .resolve(&reach(&[0.0]), 1, AxisName::X)
+                .resolve(None, &reach(&[0.0]), 1, AxisName::X)
                 .unwrap(),
             [-0.5, 0.5]
         );
         let [low, high] = Axis::log("")
-            .resolve(&reach(&[5.0]), 1, AxisName::X)
+            .resolve(None, &reach(&[5.0]), 1, AxisName::X)
             .unwrap();
         assert!(low < 5.0 && 5.0 < high);
     }
@@ -291,7 +292,7 @@ mod tests {
     #[test]
     fn log_axes_refuse_what_has_no_logarithm() {
         let error = Axis::log("")
-            .resolve(&reach(&[-1.0, 2.0]), 3, AxisName::Y)
+            .resolve(None, &reach(&[-1.0, 2.0]), 3, AxisName::Y)
             .unwrap_err();
         assert_eq!(
             error.to_string(),
@@ -302,7 +303,7 @@ mod tests {
             ..Axis::log("")
         };
         assert!(matches!(
-            given.resolve(&reach(&[1.0]), 1, AxisName::X),
+            given.resolve(given.range, &reach(&[1.0]), 1, AxisName::X),
             Err(Error::NotPositive { .. })
         ));
     }
@@ -321,14 +322,14 @@ mod tests {
             };
             assert!(
                 matches!(
-                    axis.resolve(&Reach::NONE, 1, AxisName::X),
+                    axis.resolve(axis.range, &Reach::NONE, 1, AxisName::X),
                     Err(Error::BadRange { .. })
                 ),
                 "{range:?}"
             );
         }
         let error = Axis::default()
-            .resolve(&Reach::NONE, 1, AxisName::X)
+            .resolve(None, &Reach::NONE, 1, AxisName::X)
             .unwrap_err();
         assert_eq!(
             error,

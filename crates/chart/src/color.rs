@@ -72,6 +72,12 @@ impl Color {
     pub fn dark(self) -> Self {
         self.mix(Self::BLACK, 0.4)
     }
+
+    /// Whether white text reads better on it than black: by luminance (Rec. 709, gamma of 2).
+    pub(crate) fn is_dark(self) -> bool {
+        let light = |channel: u8| (f64::from(channel) / 255.0).powi(2);
+        0.2126 * light(self.red) + 0.7152 * light(self.green) + 0.0722 * light(self.blue) < 0.25
+    }
 }
 
 impl fmt::Display for Color {
@@ -100,7 +106,7 @@ const PALETTE: [Color; 7] = [
 #[must_use]
 pub fn palette(series: usize) -> Color {
     let color = PALETTE[series % PALETTE.len()];
-    if series / PALETTE.len() % 2 == 0 {
+    if (series / PALETTE.len()).is_multiple_of(2) {
         color
     } else {
         color.dark()

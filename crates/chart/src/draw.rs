@@ -1,21 +1,17 @@
 //! Shapes on the page.
 
-use std::fmt::Write as _;
-
 use crate::axis::Mapping;
 use crate::color::{Color, ColorMap};
+use crate::glyph::{FAINT, arrow_head, box_data, cap, inside, markers};
 use crate::mark::{Direction, Ellipse, Grid, Interval, Mark, Note, Shape};
-use crate::path::{Frame, Px, TOLERANCE_PX, thin};
-use crate::style::{Anchor, Dash, Fill, Marker, Style};
-use crate::svg::{Align, Num, Svg, Type, Weight, area, line_data, opacity, stroke};
+use crate::path::{Frame, Px, thin, tolerance_px};
+use crate::style::{Anchor, Dash, Style};
+use crate::svg::{Align, Svg, Type, Weight, area, line_data, stroke};
 use crate::text;
+use crate::ticks::decimal;
 
-/// How strongly bands, stripes and faint fills show.
-pub(crate) const FAINT: f64 = 0.18;
-/// Half the width of the caps of error bars, px.
-const CAP_PX: f64 = 3.5;
 /// The number of colours in a coloured line and in a colour bar.
-pub(crate) const LEVELS: usize = 48;
+pub(crate) const LEVELS: usize = 64;
 
 /// A resolved colour scale.
 #[derive(Debug, Clone, Copy)]
@@ -31,6 +27,10 @@ impl Colors {
 
     fn level(&self, value: f64) -> usize {
         ((self.share(value) * LEVELS as f64) as usize).min(LEVELS - 1)
+    }
+
+    fn of(&self, value: f64) -> Color {
+        self.map.at(self.share(value))
     }
 
     pub(crate) fn of_level(&self, level: usize) -> Color {
@@ -95,7 +95,10 @@ impl View {
             Shape::Stripes { between, direction } => self.stripes(svg, between, *direction, style),
             Shape::Notes(notes) => notes.iter().for_each(|note| self.note(svg, note, style)),
             Shape::ColoredLine { points, values } => self.colored_line(svg, points, values, style),
-            Shape::Cells(grid) => self.cells(svg, grid),
+            Shape::Cells(grid) => {
+                self.cells(svg, grid);
+                self.cell_values(svg, grid, style);
+            }
         }
     }
 
@@ -106,7 +109,7 @@ impl View {
     fn line_data(&self, points: impl Iterator<Item = Px>) -> String {
         let mut data = String::new();
         for run in self.frame.cut_line(points) {
-            line_data(&thin(&run, TOLERANCE_PX), &mut data);
+            line_data(&thin(&run, tolerance_px(run.len())), &mut data);
         }
         data
     }
@@ -160,7 +163,8 @@ impl View {
     }
 
     fn area(&self, svg: &mut Svg, points: Vec<Px>, attributes: &str) {
-        let kept = thin(&self.frame.cut_area(points), TOLERANCE_PX);
+        let kept = self.frame.cut_area(points);
+        let kept = thin(&kept, tolerance_px(kept.len()));
         if kept.len() > 2 {
             let mut data = String::new();
             line_data(&kept, &mut data);
@@ -333,193 +337,57 @@ impl View {
 
     fn cells(&self, svg: &mut Svg, grid: &Grid) {
         let Some(colors) = self.colors else { return };
-        let columns = grid.x_edges.len().saturating_sub(1).max(1);
         svg.put(format_args!("<g shape-rendering=\"crispEdges\">"));
-        for (index, &value) in grid
+        for (value, [from, to]) in self.cell_boxes(grid) {
+            let mut data = String::new();
+            box_data(self.frame.clamp(from), self.frame.clamp(to), &mut data);
+            svg.path(&data, &area(colors.of(value), 1.0));
+        }
+        svg.put(format_args!("</g>"));
+    }
+
+    /// The values of a grid in their cells.
+    fn cell_values(&self, svg: &mut Svg, grid: &Grid, style: &Style) {
+        let (Some(colors), Some(decimals)) = (self.colors, grid.decimals) else {
+            return;
+        };
+        for (value, [from, to]) in self.cell_boxes(grid) {
+            let middle = [(from[0] + to[0]) / 2.0, (from[1] + to[1]) / 2.0];
+            if self.frame.holds(middle) {
+                let dark = colors.of(value).is_dark();
+                let color = if dark { Color::WHITE } else { Color::INK };
+                let set = Type {
+                    color,
+                    ..Type::new(style.text_px, Align::Middle)
+                };
+                svg.text(
+                    &[decimal(value, decimals)],
+                    [middle[0], middle[1] + 0.36 * style.text_px],
+                    set,
+                );
+            }
+        }
+    }
+
+    /// The finite values of a grid with two opposite corners of their cells.
+    fn cell_boxes<'g>(&'g self, grid: &'g Grid) -> impl Iterator<Item = (f64, [Px; 2])> + 'g {
+        let columns = grid.x_edges.len().saturating_sub(1).max(1);
+        let cells = grid
             .values
             .iter()
             .enumerate()
-            .filter(|(_, value)| value.is_finite())
-        {
+            .filter(|(_, value)| value.is_finite());
+        let cells = cells.map(move |(index, &value)| {
             let (row, column) = (index / columns, index % columns);
-            let corners =
-                [0, 1].map(|step| self.px([grid.x_edges[column + step], grid.y_edges[row + step]]));
-            if corners.iter().all(is_finite) {
-                let mut data = String::new();
-                box_data(
-                    self.frame.clamp(corners[0]),
-                    self.frame.clamp(corners[1]),
-                    &mut data,
-                );
-                svg.path(&data, &area(colors.map.at(colors.share(value)), 1.0));
-            }
-        }
-        svg.put(format_args!("</g>"));
+            (
+                value,
+                [0, 1].map(|step| self.px([grid.x_edges[column + step], grid.y_edges[row + step]])),
+            )
+        });
+        cells.filter(|(_, corners)| corners.iter().all(is_finite))
     }
 }
 
 fn is_finite(point: &Px) -> bool {
     point[0].is_finite() && point[1].is_finite()
-}
-
-/// The colour and opacity inside an outline, if there is any.
-pub(crate) fn inside(style: &Style) -> Option<(Color, f64)> {
-    match style.fill {
-        Fill::Open => None,
-        Fill::Solid => Some((style.color, style.opacity)),
-        Fill::Faint => Some((style.color, FAINT * style.opacity)),
-        Fill::With(color) => Some((color, style.opacity)),
-    }
-}
-
-/// Markers at points of the page, as one path.
-pub(crate) fn markers(svg: &mut Svg, points: &[Px], style: &Style) {
-    let mut data = String::new();
-    if style.marker == Marker::Circle && style.fill == Fill::Solid {
-        // A line without length and with round ends is a disc: a fifth of the bytes of one drawn with arcs.
-        for [x, y] in points {
-            put(&mut data, format_args!("M{} {}h0", Num(*x), Num(*y)));
-        }
-        let disc = Style {
-            width_px: style.size_px,
-            dash: Dash::Solid,
-            ..*style
-        };
-        return svg.path(
-            &data,
-            &format!("{} stroke-linecap=\"round\"", stroke(&disc)),
-        );
-    }
-    points
-        .iter()
-        .for_each(|&point| marker_data(style.marker, point, style.size_px, &mut data));
-    let line = stroke(&Style {
-        dash: Dash::Solid,
-        width_px: style.width_px.min(style.size_px / 4.0),
-        ..*style
-    });
-    let attributes = match inside(style) {
-        Some((color, share)) => line.replacen(
-            "fill=\"none\"",
-            &format!("fill=\"{color}\"{}", opacity("fill-opacity", share)),
-            1,
-        ),
-        None => line,
-    };
-    svg.path(&data, &attributes);
-}
-
-/// Path data of a marker; sizes are such that all seem equally large.
-fn marker_data(marker: Marker, [x, y]: Px, size_px: f64, data: &mut String) {
-    let r = size_px / 2.0;
-    match marker {
-        Marker::Circle => {
-            let (r, d) = (Num(r), Num(2.0 * r));
-            let left = Num(x - size_px / 2.0);
-            put(
-                data,
-                format_args!(
-                    "M{left} {}a{r} {r} 0 1 0 {d} 0a{r} {r} 0 1 0 -{d} 0Z",
-                    Num(y)
-                ),
-            );
-        }
-        Marker::Cross => rays(data, [x, y], &[[0.8 * r, 0.8 * r], [0.8 * r, -0.8 * r]]),
-        Marker::Plus => rays(data, [x, y], &[[1.05 * r, 0.0], [0.0, 1.05 * r]]),
-        Marker::Star => rays(
-            data,
-            [x, y],
-            &[[r, 0.0], [0.0, r], [0.7 * r, 0.7 * r], [0.7 * r, -0.7 * r]],
-        ),
-        Marker::Square => corners(
-            data,
-            [x, y],
-            0.88 * r,
-            &[[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]],
-        ),
-        Marker::Diamond => corners(
-            data,
-            [x, y],
-            1.2 * r,
-            &[[0.0, -1.0], [1.0, 0.0], [0.0, 1.0], [-1.0, 0.0]],
-        ),
-        Marker::Triangle => corners(
-            data,
-            [x, y],
-            1.2 * r,
-            &[[0.0, -1.0], [0.9, 0.6], [-0.9, 0.6]],
-        ),
-        Marker::TriangleDown => corners(
-            data,
-            [x, y],
-            1.2 * r,
-            &[[0.0, 1.0], [0.9, -0.6], [-0.9, -0.6]],
-        ),
-    }
-}
-
-fn rays(data: &mut String, [x, y]: Px, rays: &[[f64; 2]]) {
-    for [dx, dy] in rays {
-        put(
-            data,
-            format_args!(
-                "M{} {}l{} {}",
-                Num(x - dx),
-                Num(y - dy),
-                Num(2.0 * dx),
-                Num(2.0 * dy)
-            ),
-        );
-    }
-}
-
-fn corners(data: &mut String, [x, y]: Px, size: f64, corners: &[[f64; 2]]) {
-    let around: Vec<Px> = corners
-        .iter()
-        .map(|[dx, dy]| [x + size * dx, y + size * dy])
-        .collect();
-    line_data(&around, data);
-    data.push('Z');
-}
-
-/// Path data of a box between two corners.
-pub(crate) fn box_data(from: Px, to: Px, data: &mut String) {
-    line_data(&[from, [to[0], from[1]], to, [from[0], to[1]]], data);
-    data.push('Z');
-}
-
-/// Path data of the cap of an error bar.
-pub(crate) fn cap([x, y]: Px, direction: Direction, data: &mut String) {
-    match direction {
-        Direction::Vertical => line_data(&[[x - CAP_PX, y], [x + CAP_PX, y]], data),
-        Direction::Horizontal => line_data(&[[x, y - CAP_PX], [x, y + CAP_PX]], data),
-    }
-}
-
-/// Adds an arrow's head to the path data; returns where the shaft ends.
-pub(crate) fn arrow_head(from: Px, to: Px, width_px: f64, data: &mut String) -> Px {
-    let (dx, dy) = (to[0] - from[0], to[1] - from[1]);
-    let length = dx.hypot(dy);
-    if length == 0.0 {
-        return to;
-    }
-    let head = (5.0 + 2.0 * width_px).min(length);
-    let (ux, uy) = (dx / length, dy / length);
-    let base = [to[0] - head * ux, to[1] - head * uy];
-    let half = 0.42 * head;
-    line_data(
-        &[
-            to,
-            [base[0] - half * uy, base[1] + half * ux],
-            [base[0] + half * uy, base[1] - half * ux],
-        ],
-        data,
-    );
-    data.push('Z');
-    base
-}
-
-fn put(data: &mut String, text: std::fmt::Arguments<'_>) {
-    data.write_fmt(text)
-        .expect("writing to a string cannot fail");
 }

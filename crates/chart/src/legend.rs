@@ -1,6 +1,6 @@
 //! Legends: a sample and a name for each labelled mark.
 
-use crate::draw::{FAINT, arrow_head, box_data, cap, inside, markers};
+use crate::glyph::{FAINT, arrow_head, box_data, cap, inside, markers};
 use crate::mark::{Direction, Mark, Shape};
 use crate::path::Px;
 use crate::style::Style;

@@ -30,15 +30,19 @@
 //! # Ok::<(), chart::Error>(())
 //! ```
 
+mod axes;
 mod axis;
+mod bar;
 mod color;
 mod draw;
 mod error;
 mod figure;
+mod glyph;
 mod layout;
 mod legend;
 mod mark;
 mod path;
+mod plan;
 mod style;
 mod svg;
 mod text;

@@ -87,6 +87,8 @@ pub struct Grid {
     pub y_edges: Vec<f64>,
     /// The R x C values, row after row; one that is not finite leaves its cell empty.
     pub values: Vec<f64>,
+    /// With how many decimals the values are written into their cells; not at all if absent.
+    pub decimals: Option<usize>,
 }
 
 /// The numbers of a mark, in data coordinates, points as (x, y). What is not finite is left out.

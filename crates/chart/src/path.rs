@@ -12,14 +12,13 @@ pub(crate) struct Frame {
 /// A point on the page, px.
 pub(crate) type Px = [f64; 2];
 
-/// How far a thinned line may be from the full one, px: a tenth of a line's width.
-pub(crate) const TOLERANCE_PX: f64 = 0.12;
+/// How far a thinned line of this many points may be from the full one, px: a tenth of a line's width; a long line is
+/// dense with noise, where more passes unseen.
+pub(crate) fn tolerance_px(points: usize) -> f64 {
+    if points > 4000 { 0.35 } else { 0.12 }
+}
 
 impl Frame {
-    pub(crate) fn width(&self) -> f64 {
-        self.right - self.left
-    }
-
     pub(crate) fn height(&self) -> f64 {
         self.bottom - self.top
     }

@@ -146,10 +146,13 @@ pub(crate) fn number(value: f64) -> String {
     }
 }
 
-/// Candidates for the ticks of a linear axis, from dense to sparse.
+/// Candidates for the ticks of a linear axis, from dense to sparse; none has more than one tick over the parts.
 pub(crate) fn linear(range: [f64; 2], parts: f64) -> impl Iterator<Item = Vec<Tick>> {
-    let first = Step::for_span(range[1] - range[0], parts);
-    std::iter::successors(Some(first), |step| Some(step.next())).map(move |step| step.ticks(range))
+    // Twice the parts: the finer step may still have few ticks in the range.
+    let finest = Step::for_span(range[1] - range[0], 2.5 * parts);
+    std::iter::successors(Some(finest), |step| Some(step.next()))
+        .map(move |step| step.ticks(range))
+        .skip_while(move |ticks| ticks.len() as f64 > parts + 1.0)
 }
 
 /// Candidates for the ticks of a logarithmic axis, from dense to sparse: 1, 2 and 5 times the powers of ten, the powers

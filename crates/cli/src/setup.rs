@@ -11,7 +11,8 @@ use sim::{
 use toml::Value;
 use track::{Course, Way};
 
-use crate::config::{self, Combine, Config, ControllerKind, Direction, ModelFile, SensorKind, WorldSource};
+use crate::args::ModelArgs;
+use crate::config::{self, Combine, Config, ControllerKind, Direction, ModelFile, ModelSource, SensorKind, WorldSource};
 
 /// A checked model on its circuit, ready to drive.
 #[derive(Debug, Clone)]
@@ -34,7 +35,7 @@ impl Setup {
         circuit: Arc<Circuit>,
         caster: Option<CasterKind>,
     ) -> Result<Self, sim::Error> {
-        let model = model(config)?;
+        let model = model(config, &circuit)?;
         let scene = Scene::new(circuit, &model, caster)?;
         Ok(Self { model, scene })
     }
@@ -74,15 +75,20 @@ pub(crate) fn course(source: &WorldSource) -> Result<Course> {
     })
 }
 
+/// The way round that a configuration names, on a course.
+pub(crate) fn way(config: &Config, course: &Course) -> Way {
+    course.way(match config.run.direction {
+        Direction::Clockwise => track::Direction::Clockwise,
+        Direction::CounterClockwise => track::Direction::CounterClockwise,
+    })
+}
+
 /// The model that a configuration states.
-pub(crate) fn model(config: &Config) -> Result<Model, sim::Error> {
+pub(crate) fn model(config: &Config, circuit: &Circuit) -> Result<Model, sim::Error> {
     let model = Model {
         machine: machine(config)?,
         run: RunRules {
-            way: match config.run.direction {
-                Direction::Clockwise => Way::Forward,
-                Direction::CounterClockwise => Way::Backward,
-            },
+            way: way(config, &circuit.course),
             control_step_s: config.controller.step_s,
             physics_steps: config.run.physics_steps as u32,
             start_offset_m: config.run.start_offset_m,
@@ -209,4 +215,11 @@ fn number(param: &sim::Param, value: &Value) -> Result<f64, String> {
         _ if param.choices.is_empty() => Err("a number".into()),
         _ => Err(format!("one of {}", param.choices.join(", "))),
     }
+}
+
+/// The model file of a command: the shipped one where its name is given and no such file is there.
+pub(crate) fn model_file(args: &ModelArgs) -> Result<ModelFile> {
+    let shipped = config::WORLDS.iter().any(|(name, _)| args.model == Path::new(name)) && !args.model.exists();
+    let source = if shipped { ModelSource::Embedded } else { ModelSource::Path(&args.model) };
+    ModelFile::load(source, &args.settings.set)
 }

@@ -99,36 +99,22 @@ impl Course {
     /// For what [`Course::new`] and [`Wall::new`] refuse, and for a text of another shape; with the line where it is known.
     pub fn from_toml(text: &str) -> Result<Self, Error> {
         let file: WorldFile = toml::from_str(text).map_err(|error| {
-            let what = Error::Format {
-                message: with_nearest_key(error.message()),
-            };
-            error
-                .span()
-                .map_or(what.clone(), |span| at_line(text, span.start, what))
+            let message = with_nearest_key(error.message());
+            at(
+                text,
+                error.span().map(|span| span.start),
+                Error::Format { message },
+            )
         })?;
-        let mut walls = [Side::Outer, Side::Inner].map(|side| (side, Vec::new()));
-        for wall in &file.wall {
-            let name = wall.name.get_ref();
-            let (_, found) = walls
-                .iter_mut()
-                .find(|(side, _)| side.name() == name)
-                .ok_or_else(|| {
-                    at_line(
-                        text,
-                        wall.name.span().start,
-                        Error::UnknownWall { name: name.clone() },
-                    )
-                })?;
-            found.push(wall.read(text)?);
-        }
-        let [outer, inner] = walls.map(|(side, mut found)| match found.len() {
-            1 => Ok(found.remove(0)),
-            count => Err(Error::WallCount {
-                name: side.name(),
-                count,
-            }),
-        });
-        Self::new(&file.name, file.arena, file.direction, outer?, inner?)
+        let [outer, inner] = file.walls(text)?;
+        Self::new(
+            &file.name,
+            *file.arena.get_ref(),
+            *file.direction.get_ref(),
+            outer,
+            inner,
+        )
+        .map_err(|what| at(text, file.place_of(&what), what))
     }
 
     /// A course of two walls whose splines run in the driving direction.
@@ -285,9 +271,55 @@ fn encloses(line: &[Segment], p: Vec2) -> bool {
 #[serde(deny_unknown_fields)]
 struct WorldFile {
     name: String,
-    arena: [f64; 2],
-    direction: Direction,
+    arena: Spanned<[f64; 2]>,
+    direction: Spanned<Direction>,
     wall: Vec<WallEntry>,
+}
+
+impl WorldFile {
+    /// The outer wall and the inner one.
+    fn walls(&self, text: &str) -> Result<[Wall; 2], Error> {
+        const SIDES: [Side; 2] = [Side::Outer, Side::Inner];
+        let known = |wall: &&WallEntry| SIDES.iter().any(|side| side.name() == wall.name.get_ref());
+        if let Some(wall) = self.wall.iter().find(|wall| !known(wall)) {
+            let name = wall.name.get_ref().clone();
+            return Err(at(
+                text,
+                Some(wall.name.span().start),
+                Error::UnknownWall { name },
+            ));
+        }
+        let [outer, inner] = SIDES.map(|side| {
+            let named: Vec<_> = self
+                .wall
+                .iter()
+                .filter(|wall| wall.name.get_ref() == side.name())
+                .collect();
+            match named[..] {
+                [wall] => wall.read(text),
+                _ => Err(Error::WallCount {
+                    name: side.name(),
+                    count: named.len(),
+                }),
+            }
+        });
+        Ok([outer?, inner?])
+    }
+
+    /// The byte of the file that an error about a whole course is about.
+    fn place_of(&self, what: &Error) -> Option<usize> {
+        let wall = |name: &str| {
+            let named = self.wall.iter().find(|wall| wall.name.get_ref() == name)?;
+            Some(named.name.span().start)
+        };
+        match what {
+            Error::Arena { .. } => Some(self.arena.span().start),
+            Error::Orientation { .. } => Some(self.direction.span().start),
+            Error::OutsideArena { wall: name, .. } => wall(name),
+            Error::WallsTouch { .. } | Error::NotInside => wall(Side::Inner.name()),
+            _ => None,
+        }
+    }
 }
 
 #[derive(Deserialize)]
@@ -309,23 +341,27 @@ impl WallEntry {
         let spline = |entry: &SplineEntry| {
             let points = entry.control_points.get_ref().iter();
             Spline::new(points.map(|&[x, y]| Vec2::new(x, y)).collect())
-                .map_err(|what| at_line(text, start_of(entry), what))
+                .map_err(|what| at(text, Some(start_of(entry)), what))
         };
         let splines = self.spline.iter().map(spline).collect::<Result<_, _>>()?;
         Wall::new(self.name.get_ref(), splines).map_err(|what| {
             let entry = what.spline().and_then(|number| self.spline.get(number - 1));
-            at_line(text, entry.map_or(self.name.span().start, start_of), what)
+            at(
+                text,
+                Some(entry.map_or(self.name.span().start, start_of)),
+                what,
+            )
         })
     }
 }
 
-fn at_line(text: &str, byte: usize, what: Error) -> Error {
-    let line = 1 + text
-        .as_bytes()
-        .iter()
-        .take(byte)
-        .filter(|&&b| b == b'\n')
-        .count();
+/// The error with the line of the byte that it is about, where that is known.
+fn at(text: &str, byte: Option<usize>, what: Error) -> Error {
+    let Some(byte) = byte else {
+        return what;
+    };
+    let before = text.as_bytes().iter().take(byte);
+    let line = 1 + before.filter(|&&b| b == b'\n').count();
     Error::At {
         line,
         what: Box::new(what),
@@ -343,5 +379,151 @@ fn with_nearest_key(message: &str) -> String {
     match nearest.flatten() {
         Some(known) => format!("{message}; nearest: `{known}`"),
         None => message.to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{CIRCUIT, circuit, on_ellipse, ring_through};
+
+    /// What the circuit is refused for after one change of its text.
+    fn refusal(old: &str, new: &str) -> String {
+        assert!(CIRCUIT.contains(old), "{old}");
+        Course::from_toml(&CIRCUIT.replacen(old, new, 1))
+            .unwrap_err()
+            .to_string()
+    }
+
+    fn round(name: &str, radius_m: f64) -> Wall {
+        ring_through(name, 4, |index| {
+            on_ellipse([radius_m; 2], index as f64 / 20.0)
+        })
+    }
+
+    fn course(outer: Wall, inner: Wall) -> Result<Course, Error> {
+        Course::new("round", [2.0, 2.0], Direction::Clockwise, outer, inner)
+    }
+
+    #[test]
+    fn circuit_is_as_its_file_says() {
+        let course = circuit();
+        assert_eq!(
+            (course.name.as_str(), course.arena_m),
+            ("roduit2007", [1.4, 1.2])
+        );
+        assert_eq!(course.wall(Side::Outer).splines().len(), 4);
+        assert_eq!(course.wall(Side::Inner).name(), Side::Inner.name());
+        assert_eq!(course.way(Direction::Clockwise), Way::Forward);
+        assert_eq!(course.way(Direction::CounterClockwise), Way::Backward);
+    }
+
+    #[test]
+    fn errors_of_the_file_carry_its_line() {
+        let line = |needle: &str| {
+            1 + CIRCUIT[..CIRCUIT.find(needle).unwrap()]
+                .matches('\n')
+                .count()
+        };
+        let points = line("[[1.29205");
+        let message = refusal("[[1.29205", "[[1.30205");
+        let mend = "let spline 2 start at [1.29205, 0.69505]";
+        let gap = "outer wall: spline 1 ends 0.010000 m away from where spline 2 starts";
+        assert_eq!(message, format!("line {points}: {gap}; {mend}"));
+        let message = refusal("[[1.29205", "[[nan");
+        assert_eq!(
+            message,
+            format!("line {points}: x of control point 1 is NaN, not a finite number")
+        );
+        let message = refusal("name = \"inner\"", "name = \"iner\"");
+        let name = line("name = \"inner\"");
+        assert_eq!(
+            message,
+            format!("line {name}: unknown wall `iner`; known: outer, inner")
+        );
+        let message = refusal("arena =", "arenna =");
+        assert!(
+            message.starts_with(&format!("line {}: unknown field `arenna`", line("arena ="))),
+            "{message}"
+        );
+        assert!(message.ends_with("nearest: `arena`"), "{message}");
+        let message = refusal("\"clockwise\"", "\"clockwse\"");
+        assert!(message.ends_with("nearest: `clockwise`"), "{message}");
+        let message = refusal("\"clockwise\"", "\"counter-clockwise\"");
+        let direction = line("direction =");
+        let wrong = "outer wall runs clockwise but direction is counter-clockwise";
+        assert!(
+            message.starts_with(&format!("line {direction}: {wrong}")),
+            "{message}"
+        );
+    }
+
+    #[test]
+    fn errors_without_a_line_say_so() {
+        let error = Course::from_toml("name = ").unwrap_err();
+        assert_eq!(error.line(), Some(1));
+        let without_inner = &CIRCUIT[..CIRCUIT.rfind("[[wall]]").unwrap()];
+        let error = Course::from_toml(without_inner).unwrap_err();
+        assert_eq!(
+            error.to_string(),
+            "the world has 0 walls named `inner`, it needs exactly one"
+        );
+        assert_eq!(error.line(), None);
+    }
+
+    #[test]
+    fn refuses_arenas_that_do_not_hold_the_walls() {
+        assert!(refusal("[1.4, 1.2]", "[1.4, 1.0]").contains("outer wall leaves the arena at"));
+        assert!(refusal("[1.4, 1.2]", "[1.4, inf]").contains("needs a width and a height"));
+        assert!(refusal("[1.4, 1.2]", "[0, 1.2]").contains("needs a width and a height"));
+    }
+
+    #[test]
+    fn refuses_walls_without_a_corridor() {
+        let crossing = course(
+            round("outer", 0.5),
+            ring_through("inner", 4, |index| {
+                on_ellipse([0.3, 0.6], index as f64 / 20.0)
+            }),
+        );
+        assert!(
+            matches!(crossing, Err(Error::WallsTouch { .. })),
+            "{crossing:?}"
+        );
+        let touching = course(round("outer", 0.5), round("inner", 0.4995));
+        assert!(
+            matches!(touching, Err(Error::WallsTouch { .. })),
+            "{touching:?}"
+        );
+        let swapped = course(round("outer", 0.3), round("inner", 0.5));
+        assert!(matches!(swapped, Err(Error::NotInside)), "{swapped:?}");
+    }
+
+    #[test]
+    fn counter_clockwise_course_has_its_outer_wall_on_the_right() {
+        let against = |name: &str, radius_m: f64| {
+            ring_through(name, 4, |index| {
+                on_ellipse([radius_m; 2], 1.0 - index as f64 / 20.0)
+            })
+        };
+        let (outer, inner) = (against("outer", 0.5), against("inner", 0.3));
+        let course = Course::new(
+            "round",
+            [2.0, 2.0],
+            Direction::CounterClockwise,
+            outer,
+            inner,
+        )
+        .unwrap();
+        let gates = course.gates(64).unwrap();
+        let inwards = Vec2::ONE - gates[0].center;
+        assert!(gates[0].left.dot(inwards) > 0.0, "left is inside");
+        assert!(gates[0].forward().dot(gates[1].center - gates[0].center) > 0.0);
+        let corridor = course.corridor_m();
+        // a ring through 20 points is not quite round: its radius wavers by 3 %
+        assert!(
+            corridor.narrowest_m > 0.19 && corridor.widest_m < 0.21,
+            "{corridor:?}"
+        );
     }
 }

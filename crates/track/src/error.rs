@@ -188,7 +188,9 @@ pub enum Error {
         count: usize,
     },
     /// Two gates cross, so that no order of crossing would be right.
-    #[error("gates {first} and {second} of {of} cross; widen the bend of the walls there")]
+    #[error(
+        "gates {first} and {second} of {of} cross; take fewer gates, or widen the bend of the walls there"
+    )]
     GatesCross {
         /// The one with the lower number.
         first: usize,

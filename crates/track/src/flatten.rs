@@ -187,17 +187,129 @@ fn span_deviation_sq(cubic: &Cubic, (low, high): (f64, f64), chord: Segment) -> 
 
 #[cfg(test)]
 mod tests {
-    use crate::testing::circuit;
+    use super::*;
+    use crate::testing::{circuit, ring};
+    use proptest::prelude::*;
 
     #[test]
     fn circuit_has_the_papers_counts() {
         let course = circuit();
-        for (e, outer, inner) in [(0.001, 61, 44), (0.005, 27, 20), (0.01, 20, 13), (0.05, 9, 6)] {
+        for (error_m, outer, inner) in [
+            (0.001, 61, 44),
+            (0.005, 27, 20),
+            (0.01, 20, 13),
+            (0.05, 9, 6),
+        ] {
             for (wall, count) in [(&course.outer, outer), (&course.inner, inner)] {
-                let chain = wall.flatten(e).unwrap();
-                println!("{e} {} {} {:e} fractions {:?}", wall.name(), chain.vertices.len(), chain.measured_error_m(wall) - e, chain.vertices.iter().map(|v| {let p=wall.parameter(v.fraction); wall.at(p).0.distance(v.position)}).fold(0.0,f64::max));
-                assert_eq!(chain.vertices.len(), count);
+                let chain = wall.flatten(error_m).unwrap();
+                assert_eq!(
+                    chain.vertices.len(),
+                    count,
+                    "{} wall, {error_m} m",
+                    wall.name()
+                );
+                let measured_m = chain.measured_error_m(wall);
+                assert!(
+                    (measured_m / error_m - 1.0).abs() < 1e-9,
+                    "{measured_m} of {error_m}"
+                );
             }
+        }
+    }
+
+    #[test]
+    fn vertices_lie_on_the_wall_in_order() {
+        let wall = circuit().outer;
+        let chain = wall.flatten(0.005).unwrap();
+        assert_eq!(chain.vertices[0].fraction, 0.0);
+        assert!(chain.vertices.is_sorted_by(|a, b| a.fraction < b.fraction));
+        for vertex in &chain.vertices {
+            assert!(wall.point(vertex.fraction).distance(vertex.position) < 1e-12);
+            assert!(
+                wall.left_normal(vertex.fraction)
+                    .distance(vertex.left_normal)
+                    < 1e-9
+            );
+        }
+    }
+
+    /// The same looked at point by point.
+    fn sampled_error_m(chain: &Chain, wall: &Wall) -> f64 {
+        let segments: Vec<_> = chain.segments().collect();
+        let distance_m = |fraction: f64| {
+            let index = segments.partition_point(|(from, _)| from.fraction <= fraction) - 1;
+            let chord = (segments[index].0.position, segments[index].1.position);
+            segment_distance_sq(wall.point(fraction), chord).sqrt()
+        };
+        (0..20_000)
+            .map(|i| distance_m(f64::from(i) / 20_000.0))
+            .fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn measured_error_agrees_with_points_looked_at_one_by_one() {
+        let wall = circuit().inner;
+        let mut chain = wall.flatten(0.01).unwrap();
+        let (measured_m, sampled_m) = (
+            chain.measured_error_m(&wall),
+            sampled_error_m(&chain, &wall),
+        );
+        assert!(
+            (measured_m - sampled_m).abs() < 1e-7,
+            "{measured_m} and {sampled_m}"
+        );
+        chain.vertices[4].position += Vec2::new(0.004, 0.02); // a moved vertex is measured where it is
+        let (measured_m, sampled_m) = (
+            chain.measured_error_m(&wall),
+            sampled_error_m(&chain, &wall),
+        );
+        let step_m = wall.length_m() / 20_000.0; // the largest distance is that of the vertex itself
+        assert!(
+            (measured_m - sampled_m).abs() < step_m,
+            "{measured_m} and {sampled_m}"
+        );
+        assert!(
+            (measured_m - 0.004_f64.hypot(0.02)).abs() < 1e-9,
+            "{measured_m}"
+        );
+    }
+
+    #[test]
+    fn refuses_errors_that_leave_nothing() {
+        let wall = circuit().inner;
+        for bad in [0.0, -0.01, f64::NAN, f64::INFINITY] {
+            assert!(
+                matches!(wall.flatten(bad), Err(Error::MaxError { .. })),
+                "{bad}"
+            );
+        }
+        let message = wall.flatten(2.0).unwrap_err().to_string();
+        assert_eq!(
+            message,
+            "maximal error 2 m leaves only 1 segments of the inner wall; take a smaller one"
+        );
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(48))]
+
+        #[test]
+        fn measured_error_never_exceeds_the_bound(wall in ring(), log_error in -4.0..-1.31_f64) {
+            let error_m = 10_f64.powf(log_error); // 0.1 to 50 mm
+            match wall.flatten(error_m) {
+                Ok(chain) => {
+                    let measured_m = chain.measured_error_m(&wall);
+                    prop_assert!(measured_m <= error_m * (1.0 + 1e-6), "{measured_m} of {error_m}");
+                }
+                Err(error) => prop_assert!(matches!(error, Error::TooCoarse { .. }), "{error}"),
+            }
+        }
+
+        #[test]
+        fn segments_grow_with_the_root_of_the_error(wall in ring(), error_m in 1e-5..1e-4_f64) {
+            let count = |error_m| wall.flatten(error_m).unwrap().vertices.len() as f64;
+            let ratio = count(error_m / 4.0) / count(error_m);
+            prop_assert!((ratio - 2.0).abs() < 0.1, "{ratio} times the segments for a quarter of the error");
         }
     }
 }

@@ -184,28 +184,112 @@ fn check(gates: &[Gate]) -> Result<(), Error> {
 
 #[cfg(test)]
 mod tests {
-    use crate::testing::circuit;
+    use super::*;
+    use crate::Course;
+    use crate::testing::{circuit, corridor};
+    use proptest::prelude::*;
 
     #[test]
     fn circuit_has_the_listed_gates() {
         let text = include_str!("../../../worlds/roduit2007/gates.csv");
-        let t=std::time::Instant::now();
-        let course=circuit();
-        println!("load {:?}", t.elapsed());
-        let t=std::time::Instant::now();
-        let gates = course.gates(100).unwrap();
-        println!("gates {:?}", t.elapsed());
-        let t=std::time::Instant::now();
-        println!("{:?} {:?}", course.corridor_m(), t.elapsed());
-        println!("len {}", gates.midline_length_m());
-        let mut worst=[0.0f64;4];
+        let gates = circuit().gates(100).unwrap();
+        assert!((gates.midline_length_m() - 3.2480).abs() < 5e-5);
+        assert_eq!(text.lines().count(), 101);
         for (line, gate) in text.lines().skip(1).zip(&gates) {
-            let v: Vec<f64> = line.split(',').map(|v| v.parse().unwrap()).collect();
-            worst[0]=worst[0].max(gate.center.distance(crate::Vec2::new(v[1],v[2])));
-            worst[1]=worst[1].max(gate.left.distance(crate::Vec2::new(v[3],v[4])));
-            worst[2]=worst[2].max((gate.left_m-v[5]).abs());
-            worst[3]=worst[3].max((gate.right_m-v[6]).abs());
+            let row: Vec<f64> = line
+                .split(',')
+                .map(|value| value.parse().unwrap())
+                .collect();
+            let center_m = gate.center.distance(Vec2::new(row[1], row[2]));
+            let left = gate.left.distance(Vec2::new(row[3], row[4]));
+            assert!(
+                center_m < 1e-4 && left < 1e-3,
+                "{line}: {center_m} m, {left} off"
+            );
+            assert!(
+                (gate.left_m - row[5]).abs() < 1e-4,
+                "{line}: left {}",
+                gate.left_m
+            );
+            assert!(
+                (gate.right_m - row[6]).abs() < 1e-4,
+                "{line}: right {}",
+                gate.right_m
+            );
         }
-        println!("{worst:?}");
+    }
+
+    /// Every property that defines the gates, but for the numbers of the circuit.
+    fn assert_gates(course: &Course, gates: &Gates) {
+        for gate in gates {
+            let (outer, inner) = (
+                course.outer.nearest(gate.center),
+                course.inner.nearest(gate.center),
+            );
+            assert!((outer.distance_m - inner.distance_m).abs() < 1e-11);
+            let to_outer = (outer.point - gate.center).normalize();
+            let from_inner = (gate.center - inner.point).normalize();
+            let across = (to_outer + from_inner).normalize();
+            assert!(
+                (across.dot(gate.left).abs() - 1.0).abs() < 1e-12,
+                "{across} and {}",
+                gate.left
+            );
+            for end in [gate.segment().0, gate.segment().1] {
+                let gap_m = course
+                    .outer
+                    .nearest(end)
+                    .distance_m
+                    .min(course.inner.nearest(end).distance_m);
+                assert!(gap_m < 1e-10, "a gate ends {gap_m} m from the walls");
+            }
+        }
+        let joint = course.outer.point(0.0);
+        let along_m = (joint - gates[0].center).dot(gates[0].forward());
+        assert!(along_m.abs() < 1e-8, "gate 0 is {along_m} m off the joint");
+    }
+
+    #[test]
+    fn gates_stand_across_the_middle() {
+        let course = circuit();
+        assert_gates(&course, &course.gates(100).unwrap());
+    }
+
+    #[test]
+    fn more_gates_contain_the_fewer() {
+        let course = circuit();
+        let (few, many) = (course.gates(25).unwrap(), course.gates(100).unwrap());
+        assert_eq!((few.len(), many.len(), few.is_empty()), (25, 100, false));
+        for (index, gate) in few.iter().enumerate() {
+            assert!(many[4 * index].center.distance(gate.center) < 1e-9);
+        }
+        assert_eq!(few.get(25), None);
+    }
+
+    #[test]
+    fn refuses_too_few() {
+        for count in [0, 1, 2, 5] {
+            let error = circuit().gates(count).unwrap_err();
+            assert_eq!(error, Error::FewGates { count });
+        }
+    }
+
+    #[test]
+    fn refuses_gates_that_cross() {
+        // the sharpest bends of the midline have their centre inside the corridor
+        let message = circuit().gates(200).unwrap_err().to_string();
+        assert!(
+            message.starts_with("gates 181 and 182 of 200 cross; take fewer gates"),
+            "{message}"
+        );
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(12))]
+
+        #[test]
+        fn gates_of_any_corridor_keep_the_definition(course in corridor()) {
+            assert_gates(&course, &course.gates(60).unwrap());
+        }
     }
 }

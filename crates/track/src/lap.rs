@@ -189,10 +189,10 @@ impl LapTracker {
         closed
     }
 
-    /// The first cell. The gate behind the robot is due too: it may have been put right on it.
+    /// The first cell.
     fn enter(&mut self, position: Vec2) {
         if let Some(cell) = (0..self.count()).find(|&cell| self.contains(cell, position)) {
-            self.due = cell;
+            self.due = cell + 1;
             self.stand_in(cell);
         }
     }
@@ -319,5 +319,266 @@ impl LapTracker {
             center: gate.center,
             forward,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::circuit;
+    use proptest::prelude::*;
+    use std::sync::LazyLock;
+
+    const N: usize = 100;
+
+    fn gates() -> Gates {
+        static GATES: LazyLock<Gates> = LazyLock::new(|| circuit().gates(N).unwrap());
+        GATES.clone()
+    }
+
+    /// A point beside a gate: `offset_m` to the left of its middle, `ahead_m` beyond it in the way of driving.
+    fn beside(gate: &Gate, way: Way, offset_m: f64, ahead_m: f64) -> Vec2 {
+        let sign = if way == Way::Forward { 1.0 } else { -1.0 };
+        gate.center + offset_m * gate.left + sign * ahead_m * gate.forward()
+    }
+
+    /// Gates passed by the straight line between a point 4 mm before and one 4 mm beyond each; one second a gate,
+    /// starting half a second before the first.
+    fn path(
+        gates: &Gates,
+        way: Way,
+        passes: impl Iterator<Item = (usize, f64)>,
+    ) -> Vec<(f64, Vec2)> {
+        let pass = |(step, (gate, offset_m)): (usize, (usize, f64))| {
+            let time_s = step as f64;
+            [(time_s - 0.2, -0.004), (time_s + 0.2, 0.004)]
+                .map(|(t, ahead_m)| (t, beside(&gates[gate % N], way, offset_m, ahead_m)))
+        };
+        passes.enumerate().flat_map(pass).collect()
+    }
+
+    /// Samples from gate 0 on: each where a line between positions first crosses the gate after the one before it.
+    fn by_definition(gates: &Gates, rows: &[(f64, Vec2)]) -> Vec<f64> {
+        let mut samples = Vec::new();
+        for pair in rows.windows(2) {
+            let (mut from, to) = (pair[0].1, pair[1].1);
+            loop {
+                let gate = gates[samples.len() % N];
+                let [before_m, after_m] = [from, to].map(|p| (p - gate.center).dot(gate.forward()));
+                let crossing = from.lerp(to, before_m / (before_m - after_m));
+                if !(before_m < 0.0 && after_m >= 0.0 && gate.admits(gate.offset_m(crossing))) {
+                    break;
+                }
+                samples.push(gate.offset_m(crossing));
+                from = crossing;
+            }
+        }
+        samples
+    }
+
+    fn assert_close(found: &[f64], truth: &[f64]) {
+        assert_eq!(found.len(), truth.len());
+        for (index, (found, truth)) in found.iter().zip(truth).enumerate() {
+            assert!(
+                (found - truth).abs() < 1e-12,
+                "gate {index}: {found} instead of {truth}"
+            );
+        }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(32))]
+
+        #[test]
+        fn offsets_come_back_exactly_both_ways(
+            offsets in prop::collection::vec(-0.05..0.05_f64, N),
+            start in 0..N,
+            backward: bool,
+        ) {
+            let gates = gates();
+            let way = if backward { Way::Backward } else { Way::Forward };
+            let number = |step: usize| if backward { (start + 4 * N - step) % N } else { (start + step) % N };
+            let passes = (0..=3 * N).map(|step| (number(step), offsets[number(step)]));
+            let laps = laps(&gates, way, &path(&gates, way, passes));
+            prop_assert_eq!(laps.len(), if number(0) == 0 { 3 } else { 2 });
+            for lap in &laps {
+                assert_close(lap.closed().unwrap(), &offsets);
+                prop_assert!((lap.duration_s() - N as f64).abs() < 1e-9);
+                let next = if backward { N - 1 } else { 1 };
+                prop_assert!((lap.times_s[next] - lap.start_s - 1.0).abs() < 1e-9);
+                prop_assert_eq!(lap.times_s[0], lap.start_s);
+            }
+        }
+
+        #[test]
+        fn gates_passed_round_their_end_are_missed(missed in prop::collection::btree_set(1..N - 1, 1..20)) {
+            let gates = gates();
+            let around = |gate: usize| if missed.contains(&gate) { gates[gate].left_m + 0.01 } else { 0.01 };
+            let passes = (0..=N).map(|gate| (gate, around(gate % N)));
+            let laps = laps(&gates, Way::Forward, &path(&gates, Way::Forward, passes));
+            prop_assert_eq!(laps.len(), 1);
+            prop_assert_eq!(&laps[0].missed, &missed.iter().copied().collect::<Vec<_>>());
+            let error = laps[0].closed().unwrap_err();
+            prop_assert_eq!(error, Error::MissedGate { gate: laps[0].missed[0], of: N });
+            prop_assert!(missed.iter().all(|&gate| laps[0].offsets_m[gate].is_nan()));
+        }
+
+        #[test]
+        fn back_and_forth_over_the_gates_changes_nothing(
+            jitter in prop::collection::vec((-0.003..0.003_f64, -0.003..0.003_f64), 40),
+        ) {
+            let gates = gates();
+            let clean = path(&gates, Way::Forward, (0..=2 * N).map(|gate| (gate, 0.02)));
+            let shaken = clean.chunks(2).enumerate().flat_map(|(step, pair)| {
+                let gate = gates[step % N];
+                let shakes = jitter.iter().enumerate().map(move |(i, &(aside_m, ahead_m))| {
+                    (pair[1].0 + 0.01 * i as f64, beside(&gate, Way::Forward, aside_m, ahead_m))
+                });
+                pair.iter().copied().chain(shakes)
+            });
+            let laps = laps(&gates, Way::Forward, &shaken.collect::<Vec<_>>());
+            prop_assert_eq!(laps.len(), 2);
+            for lap in &laps {
+                assert_close(lap.closed().unwrap(), &[0.02; N]);
+            }
+        }
+
+        #[test]
+        fn noisy_laps_are_those_of_the_definition(
+            noise in prop::collection::vec((-0.004..0.004_f64, -0.004..0.004_f64), 97),
+            waves in 1.0..9.0_f64,
+        ) {
+            let gates = gates();
+            let at = |step: usize| {
+                let (gate, part) = (&gates[step / 10 % N], (step % 10) as f64 / 10.0);
+                let offset_m = 0.055 * (waves * step as f64 / 1000.0).sin();
+                let (x, y) = noise[step % noise.len()];
+                (step as f64, beside(gate, Way::Forward, offset_m + x, part * gates.spacing_m() + y))
+            };
+            let rows: Vec<_> = (0..3500).map(at).collect();
+            let found: Vec<f64> = laps(&gates, Way::Forward, &rows)
+                .iter()
+                .flat_map(|lap| lap.closed().unwrap().to_vec())
+                .collect();
+            let truth = by_definition(&gates, &rows);
+            prop_assert!(found.len() >= 2 * N);
+            assert_close(&found, &truth[..found.len()]);
+        }
+
+        #[test]
+        fn the_wrong_way_closes_no_lap(
+            jitter in prop::collection::vec((-0.02..0.02_f64, -0.02..0.02_f64), 37),
+            start in 0..N,
+        ) {
+            let gates = gates();
+            let mut tracker = LapTracker::new(&gates, Way::Forward);
+            for step in 0..10 * 4 * N {
+                let (gate, (aside_m, ahead_m)) = (&gates[(start + 10 * N - step / 4) % N], jitter[step % jitter.len()]);
+                prop_assert_eq!(tracker.push(step as f64, beside(gate, Way::Forward, aside_m, ahead_m)), None);
+            }
+        }
+    }
+
+    #[test]
+    fn one_long_line_crosses_several_gates() {
+        let gates = gates();
+        // gates 25 to 35 stand on the circuit's longest straight
+        let mut rows = path(&gates, Way::Forward, (0..=N).map(|gate| (gate, 0.0)));
+        rows.drain(2 * 26..2 * 35);
+        let laps = laps(&gates, Way::Forward, &rows);
+        assert_eq!(laps.len(), 1);
+        let offsets_m = laps[0].closed().unwrap();
+        assert!(
+            offsets_m.iter().all(|offset_m| offset_m.abs() < 0.01),
+            "{offsets_m:?}"
+        );
+        assert!(laps[0].times_s.is_sorted());
+    }
+
+    #[test]
+    fn gap_across_the_inner_wall_leaves_a_lap_that_says_so() {
+        let gates = gates();
+        let mut rows = path(&gates, Way::Forward, (0..=2 * N).map(|gate| (gate, 0.0)));
+        rows.drain(2 * 10..2 * 55);
+        let laps = laps(&gates, Way::Forward, &rows);
+        assert_eq!(laps.len(), 2);
+        assert!(laps[0].missed.contains(&40), "{:?}", laps[0].missed);
+        assert!(
+            laps[0].missed.iter().all(|gate| (10..55).contains(gate)),
+            "{:?}",
+            laps[0].missed
+        );
+        assert!((laps[0].duration_s() - 100.0).abs() < 1e-9);
+        assert!(laps[1].closed().is_ok());
+    }
+
+    #[test]
+    fn missed_gate_0_spoils_both_laps() {
+        let gates = gates();
+        let offset_m = |step: usize| {
+            if step == N {
+                gates[0].left_m + 0.01
+            } else {
+                0.0
+            }
+        };
+        let passes = (0..=3 * N).map(|step| (step, offset_m(step)));
+        let laps = laps(&gates, Way::Forward, &path(&gates, Way::Forward, passes));
+        assert_eq!(laps.len(), 3);
+        assert_eq!((&laps[0].missed, &laps[1].missed), (&vec![0], &vec![0]));
+        assert!(
+            laps[0].end_s.is_nan() && laps[1].start_s.is_nan() && laps[1].offsets_m[0].is_nan()
+        );
+        assert!(laps[2].closed().is_ok());
+    }
+
+    #[test]
+    fn turning_round_and_back_samples_each_gate_once() {
+        let gates = gates();
+        let mut tracker = LapTracker::new(&gates, Way::Forward);
+        let middle = |gate: usize| {
+            gates[gate % N].center + 0.5 * gates.spacing_m() * gates[gate % N].forward()
+        };
+        let there = 95..160;
+        let back = (120..160).rev();
+        let on = 120..=200;
+        let steps = there.chain(back).chain(on);
+        let laps: Vec<Lap> = steps
+            .enumerate()
+            .filter_map(|(t, gate)| tracker.push(t as f64, middle(gate)))
+            .collect();
+        assert_eq!(laps.len(), 1);
+        assert!(laps[0].closed().is_ok());
+        assert_eq!((tracker.expected_gate(), tracker.gates_passed()), (1, 105));
+        assert!(
+            (laps[0].duration_s() - 180.0).abs() < 1.0,
+            "{}",
+            laps[0].duration_s()
+        );
+    }
+
+    #[test]
+    fn a_lap_backwards_is_no_debt() {
+        let gates = gates();
+        let mut tracker = LapTracker::new(&gates, Way::Forward);
+        let middle = |gate: usize| {
+            gates[gate % N].center + 0.5 * gates.spacing_m() * gates[gate % N].forward()
+        };
+        let steps = (350..=499).rev().chain(350..=501);
+        let laps = steps
+            .enumerate()
+            .filter_map(|(t, gate)| tracker.push(t as f64, middle(gate)))
+            .count();
+        assert_eq!(laps, 1, "gate 0 is crossed as 400 and as 500");
+    }
+
+    #[test]
+    fn what_is_not_finite_is_not_seen() {
+        let gates = gates();
+        let mut rows = path(&gates, Way::Forward, (0..=N).map(|gate| (gate, 0.0)));
+        rows.insert(51, (25.0, Vec2::NAN));
+        rows.insert(0, (-1.0, Vec2::new(f64::INFINITY, 0.0)));
+        assert_eq!(laps(&gates, Way::Forward, &rows).len(), 1);
+        assert!(laps(&gates, Way::Forward, &[]).is_empty());
     }
 }

@@ -6,8 +6,8 @@ const STEP_M: f64 = 2e-3;
 const SHORTEST_STEP_M: f64 = 1e-6;
 /// Largest turn in one step.
 const TURN_RAD: f64 = 0.02;
-/// How far a point of the midline may be nearer to one wall than to the other.
-const BALANCE_M: f64 = 1e-13;
+/// How far a point of the midline may be nearer to one wall than to the other, beside its distance from the origin.
+const BALANCE: f64 = 1e-13;
 
 /// The closed line of points equidistant from both walls, in driving direction.
 #[derive(Debug, Clone)]
@@ -64,7 +64,7 @@ impl Walls<'_> {
             let across = direction - to_right / right_m;
             let left = across.normalize();
             let excess_m = left_m - right_m;
-            if excess_m.abs() < BALANCE_M {
+            if excess_m.abs() < BALANCE * (1.0 + p.length()) {
                 return Ok(Station {
                     along_m: 0.0,
                     point: p,
@@ -189,5 +189,58 @@ impl Midline {
             }
         }
         Ok(0.5 * (low + high))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::circuit;
+
+    #[test]
+    fn length_is_that_of_ever_finer_chords() {
+        let course = circuit();
+        let walls = Walls {
+            left: &course.outer,
+            right: &course.inner,
+        };
+        let midline = Midline::new(walls).unwrap();
+        let chords_m = |count: u32| {
+            let at = |i: u32| {
+                midline
+                    .at(walls, midline.length_m() * f64::from(i) / f64::from(count))
+                    .unwrap()
+                    .point
+            };
+            (0..count).map(|i| at(i).distance(at(i + 1))).sum::<f64>()
+        };
+        let (coarse_m, fine_m) = (chords_m(4000), chords_m(8000));
+        let extrapolated_m = fine_m + (fine_m - coarse_m) / 3.0; // chords miss the arc by the square of the step
+        let length_m = midline.length_m();
+        assert!(
+            (length_m - extrapolated_m).abs() < 1e-7,
+            "{length_m} and {extrapolated_m}"
+        );
+    }
+
+    #[test]
+    fn points_keep_their_distances() {
+        let course = circuit();
+        let walls = Walls {
+            left: &course.outer,
+            right: &course.inner,
+        };
+        let midline = Midline::new(walls).unwrap();
+        let step_m = midline.length_m() / 3000.0;
+        for i in 0..3000 {
+            let [here, there] =
+                [i, i + 1].map(|i| midline.at(walls, f64::from(i) * step_m).unwrap());
+            let (arc_m, turn_rad) = here.step_to(&there);
+            assert!(
+                (arc_m - step_m).abs() < 1e-8,
+                "{arc_m} m instead of {step_m} m, {turn_rad} rad, at {}",
+                here.point
+            );
+        }
     }
 }

@@ -376,3 +376,213 @@ pub(crate) fn segment_distance_sq(p: Vec2, (a, b): Segment) -> f64 {
     };
     (to - part * along).length_squared()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{circuit, on_ellipse, ring, ring_through};
+    use proptest::prelude::*;
+
+    /// Two straights of 1 m, joined by two bends.
+    fn stadium() -> Wall {
+        let v = |points: &[(f64, f64)]| {
+            Spline::new(points.iter().map(|&(x, y)| Vec2::new(x, y)).collect()).unwrap()
+        };
+        let splines = vec![
+            v(&[(0.0, 1.0), (0.5, 1.0), (1.0, 1.0)]),
+            v(&[(1.0, 1.0), (1.5, 1.0), (1.5, 0.0), (1.0, 0.0)]),
+            v(&[(1.0, 0.0), (0.5, 0.0), (0.0, 0.0)]),
+            v(&[(0.0, 0.0), (-0.5, 0.0), (-0.5, 1.0), (0.0, 1.0)]),
+        ];
+        Wall::new("stadium", splines).unwrap()
+    }
+
+    #[test]
+    fn straights_are_measured_exactly() {
+        let wall = stadium();
+        let along = |distance_m: f64| wall.point(distance_m / wall.length_m());
+        for distance_m in [0.0, 0.125, 0.3, 0.99] {
+            assert!(along(distance_m).distance(Vec2::new(distance_m, 1.0)) < 1e-14);
+            assert!(
+                wall.left_normal(distance_m / wall.length_m())
+                    .distance(Vec2::Y)
+                    < 1e-15
+            );
+        }
+        let opposite = 0.5 + 0.25 / wall.length_m();
+        assert!(wall.point(opposite).distance(Vec2::new(0.75, 0.0)) < 1e-12);
+        assert_eq!(wall.joints().len(), 4);
+    }
+
+    #[test]
+    fn nearest_point_of_a_straight_is_the_foot() {
+        let wall = stadium();
+        let nearest = wall.nearest(Vec2::new(0.3, 1.25));
+        assert!((nearest.distance_m - 0.25).abs() < 1e-15, "{nearest:?}");
+        assert!(
+            (nearest.fraction * wall.length_m() - 0.3).abs() < 1e-12,
+            "{nearest:?}"
+        );
+        assert!(
+            nearest.point.distance(Vec2::new(0.3, 1.0)) < 1e-12,
+            "{nearest:?}"
+        );
+    }
+
+    #[test]
+    fn length_is_that_of_ever_finer_chords() {
+        let wall = circuit().outer;
+        let chords_m = |count: u32| {
+            let at = |i: u32| wall.point(f64::from(i) / f64::from(count));
+            (0..count).map(|i| at(i).distance(at(i + 1))).sum::<f64>()
+        };
+        let (coarse_m, fine_m) = (chords_m(5000), chords_m(10_000));
+        let extrapolated_m = fine_m + (fine_m - coarse_m) / 3.0;
+        let length_m = wall.length_m();
+        assert!(
+            (length_m - extrapolated_m).abs() < 1e-10,
+            "{length_m} and {extrapolated_m}"
+        );
+    }
+
+    #[test]
+    fn first_hit_of_a_ray_is_on_the_wall() {
+        let wall = stadium();
+        let middle = Vec2::new(0.5, 0.5);
+        assert!((wall.along(middle, Vec2::Y).unwrap() - 0.5).abs() < 1e-15);
+        let right_m = wall.along(middle, Vec2::X).unwrap();
+        assert!(wall.nearest(middle + right_m * Vec2::X).distance_m < 1e-14);
+        assert_eq!(wall.along(Vec2::new(0.5, 3.0), Vec2::Y), None);
+    }
+
+    #[test]
+    fn names_the_spline_that_does_not_fit() {
+        let mut splines = stadium().splines().to_vec();
+        splines[2] =
+            Spline::new(vec![Vec2::new(1.0, -0.01), Vec2::new(0.5, 0.0), Vec2::ZERO]).unwrap();
+        let gap = Wall::new("outer", splines.clone()).unwrap_err().to_string();
+        let expected = "outer wall: spline 2 ends 0.010000 m away from where spline 3 starts; \
+                        let spline 3 start at [1.00000, 0.00000]";
+        assert_eq!(gap, expected);
+        splines[2] = Spline::new(vec![Vec2::X, Vec2::new(0.51, 0.0), Vec2::ZERO]).unwrap();
+        let corner = Wall::new("outer", splines.clone()).unwrap_err().to_string();
+        let expected = "outer wall: the first derivative jumps by 0.010000 m from spline 2 to spline 3; \
+                        move the second control point of spline 3 to [0.50000, 0.00000]";
+        assert_eq!(corner, expected);
+        splines.truncate(2);
+        let open = Wall::new("outer", splines).unwrap_err();
+        assert!(
+            matches!(
+                open,
+                Error::Gap {
+                    spline: 2,
+                    next: 1,
+                    ..
+                }
+            ),
+            "{open}"
+        );
+        assert!(matches!(
+            Wall::new("outer", vec![]),
+            Err(Error::NoSplines { .. })
+        ));
+    }
+
+    #[test]
+    fn small_gaps_are_closed() {
+        let mut splines = stadium().splines().to_vec();
+        splines[2] = splines[2].clone().starting_at(Vec2::new(1.0, 5e-5));
+        let wall = Wall::new("outer", splines).unwrap();
+        assert_eq!(wall.splines()[2].control_points_m()[0], Vec2::X);
+    }
+
+    #[test]
+    fn refuses_walls_that_cross_themselves_or_turn_on_the_spot() {
+        let v = |points: &[(f64, f64)]| {
+            Spline::new(points.iter().map(|&(x, y)| Vec2::new(x, y)).collect()).unwrap()
+        };
+        let eight = vec![
+            v(&[
+                (0.0, 0.0),
+                (0.3, 0.3),
+                (0.9, 0.3),
+                (0.9, -0.3),
+                (0.3, -0.3),
+                (0.0, 0.0),
+            ]),
+            v(&[
+                (0.0, 0.0),
+                (-0.3, 0.3),
+                (-0.9, 0.3),
+                (-0.9, -0.3),
+                (-0.3, -0.3),
+                (0.0, 0.0),
+            ]),
+        ];
+        match Wall::new("inner", eight) {
+            Err(Error::SelfCrossing { at_m, .. }) => assert!(at_m.length() < 1e-9, "{at_m}"),
+            other => panic!("{other:?}"),
+        }
+        let there_and_back = v(&[
+            (0.0, 0.0),
+            (0.3, 0.0),
+            (0.6, 0.0),
+            (0.3, 0.0),
+            (-0.3, 0.0),
+            (0.0, 0.0),
+        ]);
+        let error = Wall::new("inner", vec![there_and_back]).unwrap_err();
+        assert!(matches!(error, Error::Cusp { spline: 1, .. }), "{error}");
+    }
+
+    #[test]
+    fn nearest_is_exact_where_it_is_about_to_jump() {
+        // near the centre of a ring the nearest point could be anywhere
+        let wall = ring_through("round", 4, |index| {
+            on_ellipse([0.1, 0.1], index as f64 / 20.0)
+        });
+        for (x, y) in [(1.0, 1.0), (1.001, 1.0), (0.999, 1.002), (1.01, 1.01)] {
+            assert_nearest(&wall, Vec2::new(x, y));
+        }
+    }
+
+    fn assert_nearest(wall: &Wall, p: Vec2) {
+        let nearest = wall.nearest(p);
+        let brute_m = (0..4000)
+            .map(|i| wall.point(f64::from(i) / 4000.0).distance(p))
+            .fold(f64::INFINITY, f64::min);
+        let (found_m, step_m) = (nearest.distance_m, wall.length_m() / 4000.0);
+        assert!(
+            found_m <= brute_m + 1e-12 && found_m >= brute_m - step_m,
+            "{found_m} and {brute_m}"
+        );
+        assert!(wall.point(nearest.fraction).distance(nearest.point) < 1e-10);
+        assert!((nearest.point.distance(p) - found_m).abs() < 1e-15);
+        let along_m = (p - nearest.point).dot(wall.left_normal(nearest.fraction).perp());
+        assert!(along_m.abs() < 1e-10, "the foot is {along_m} m off");
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(48))]
+
+        #[test]
+        fn nearest_beats_every_other_point(wall in ring(), x in 0.0..2.0_f64, y in 0.0..2.0_f64) {
+            assert_nearest(&wall, Vec2::new(x, y));
+        }
+
+        #[test]
+        fn fractions_go_along_the_wall_at_constant_speed(wall in ring(), fraction in -1.0..2.0_f64) {
+            let step = 1e-4;
+            let moved = wall.point(fraction + step) - wall.point(fraction - step);
+            let speed = moved.length() / (2.0 * step * wall.length_m());
+            prop_assert!((speed - 1.0).abs() < 1e-4, "{speed}");
+            let normal = wall.left_normal(fraction);
+            prop_assert!(normal.dot(moved.normalize()).abs() < 1e-3);
+            prop_assert!((normal.length() - 1.0).abs() < 1e-14);
+            prop_assert!(wall.point(fraction).distance(wall.point(fraction + 1.0)) < 1e-10);
+            let back = wall.fraction(wall.parameter(fraction));
+            let off = (back - fraction).rem_euclid(1.0);
+            prop_assert!(off.min(1.0 - off) < 1e-12, "{fraction} came back as {back}");
+        }
+    }
+}

@@ -76,7 +76,7 @@ fn check_value(key: &str, value: &Value, like: &Value) -> Result<(), Fault> {
 fn check_array(key: &str, items: &[Value], like: &[Value]) -> Result<(), Fault> {
     let (found, needed) = (items.len(), like.len());
     if found != needed && key != "sensor.original.table" {
-        let problem = format!("`{key}` has {found} entries; {needed} are needed");
+        let problem = format!("`{key}` has length {found}; {needed} is needed");
         return Err(Fault::new(key, problem));
     }
     let item_like = like
@@ -202,7 +202,8 @@ fn unknown(key: &str) -> Fault {
 
 /// The known dotted keys that are most like a given one: at most three, all equally near.
 ///
-/// A key that stands in the wrong table counts as one letter wrong, as does each misspelt letter.
+/// Each misspelt letter counts one, and so does standing in the wrong table or leaving out the end
+/// of the key, its unit for example.
 pub(crate) fn nearest<'a>(key: &str, known: impl IntoIterator<Item = &'a str>) -> Vec<&'a str> {
     let last = |key: &str| key.rsplit('.').next().unwrap_or_default().to_owned();
     let name = last(key);
@@ -211,7 +212,9 @@ pub(crate) fn nearest<'a>(key: &str, known: impl IntoIterator<Item = &'a str>) -
         .map(|candidate| {
             let whole = strsim::damerau_levenshtein(key, candidate);
             let end = 1 + strsim::damerau_levenshtein(&name, &last(candidate));
-            (whole.min(end), candidate)
+            let start: String = candidate.chars().take(key.chars().count()).collect();
+            let start = 1 + strsim::damerau_levenshtein(key, &start);
+            (whole.min(end).min(start), candidate)
         })
         .collect();
     ranked.sort();
@@ -269,7 +272,7 @@ impl<'a> Place<'a> {
                 items.get_mut(index).ok_or_else(|| {
                     let key = join(at, name);
                     let problem =
-                        format!("`{key}` is not there: `{at}` has {count} entries, counted from 0");
+                        format!("`{key}` is not there: `{at}` has length {count}, counted from 0");
                     Fault::new(&key, problem)
                 })
             }

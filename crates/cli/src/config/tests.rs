@@ -143,6 +143,12 @@ fn unknown_keys_name_the_nearest() {
         ),
         (
             "",
+            "controller.gian=1",
+            "--set controller.gian=1: unknown key `controller.gian`; nearest known: \
+             controller.gain_per_count",
+        ),
+        (
+            "",
             "slip.level.deep=1",
             "--set slip.level.deep=1: unknown key `slip.level.deep`: `slip.level` holds a \
              value, not keys",
@@ -150,7 +156,7 @@ fn unknown_keys_name_the_nearest() {
         (
             "",
             "effect.0.gain=1",
-            "--set effect.0.gain=1: `effect.0` is not there: `effect` has 0 entries, counted \
+            "--set effect.0.gain=1: `effect.0` is not there: `effect` has length 0, counted \
              from 0",
         ),
         (
@@ -195,11 +201,11 @@ fn values_of_the_wrong_type_say_what_is_needed() {
         ),
         (
             "sensor.mounts = []",
-            "`sensor.mounts` has 0 entries; 8 are needed",
+            "`sensor.mounts` has length 0; 8 is needed",
         ),
         (
             "sensor.original.table = [[1]]",
-            "`sensor.original.table.0` has 1 entries; 2 are needed",
+            "`sensor.original.table.0` has length 1; 2 is needed",
         ),
         (
             "[[effect]]\nby = \"run\"",

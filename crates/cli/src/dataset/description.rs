@@ -9,7 +9,8 @@ use super::{DESCRIPTION, DataSet, LAPS};
 use crate::config::{Config, ControllerKind, Document, nearest, read};
 use crate::output::Input;
 
-const KEYS: [&str; 9] = [
+/// Of a data set of laps.
+const KEYS: [&str; 8] = [
     "name",
     "kind",
     "world",
@@ -18,7 +19,6 @@ const KEYS: [&str; 9] = [
     "laps",
     "note",
     "declared",
-    "robot",
 ];
 
 /// What the rows of a data set are.
@@ -40,10 +40,10 @@ pub(super) fn load(folder: &Path) -> Result<(DataSet, Vec<(String, PathBuf)>)> {
     let label = path.display().to_string();
     let input = Input::of(label.clone(), &bytes);
     let description = Description(Document::parse(label, bytes)?);
-    description.refuse_unknown_keys()?;
     if description.kind()? == Kind::DriveLog {
         return Err(description.error("kind", "drive logs cannot be read here yet"));
     }
+    description.refuse_unknown_keys()?;
     let set = DataSet {
         name: description.required_text("name")?,
         folder: folder.to_owned(),

@@ -1,0 +1,204 @@
+//! `lapwing compare`: one Point Distribution Model of all clusters, and every pair in it.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, bail, ensure};
+use pdm::{Cluster, Modes, Pdm, TestResult};
+use serde_json::{Value, json};
+use sim::Circuit;
+use std::sync::Arc;
+
+use crate::args::Compare;
+use crate::config::Config;
+use crate::dataset::{self, DataSet};
+use crate::figures;
+use crate::gate_table::GateTable;
+use crate::interrupt;
+use crate::laps::{Measured, SampledRun};
+use crate::output::{Input, OutDir, Work};
+use crate::session::Session;
+use crate::setup;
+use crate::table::{Table, probability};
+
+pub(crate) fn run(session: &Session, args: &Compare) -> Result<()> {
+    let modes = parse_modes(&args.modes)?;
+    let clusters = if args.sampled { tables(&args.data)? } else { data_sets(session, args)? };
+    let pdm = Pdm::fit(&clusters.list)?;
+    let document = compare(session, &pdm, &clusters.list, modes, args.permutations)?;
+    if let Some(out) = &args.out {
+        let configuration = json!({ "data": args.data, "modes": args.modes, "permutations": args.permutations });
+        let folder = OutDir::create(out, &Work::new("compare", &configuration), false)?;
+        folder.write("compare.json", format!("{document:#}\n"))?;
+        folder.write("pairs.csv", pairs_csv(&document))?;
+        if pdm.degrees_of_freedom() >= 2 {
+            folder.write("modes.svg", figures::modes_figure(&pdm, &clusters.list)?.to_svg()?)?;
+        }
+        if let Some((circuit, runs)) = &clusters.course {
+            folder.write("laps.svg", figures::laps_map(circuit, runs).to_svg()?)?;
+        }
+        folder.finish(&session.manifest(configuration, clusters.inputs))?;
+    }
+    if args.json { session.print_json(&document) } else { session.print(&text(&document)) }
+}
+
+/// What is compared, and where it came from.
+struct Clusters {
+    list: Vec<Cluster>,
+    inputs: Vec<Input>,
+    /// The circuit and the laps on it, where there is one.
+    course: Option<(Arc<Circuit>, Vec<SampledRun>)>,
+}
+
+fn parse_modes(text: &str) -> Result<Modes> {
+    if text == "all" {
+        return Ok(Modes::All);
+    }
+    match text.parse() {
+        Ok(count) if count > 0 => Ok(Modes::First(count)),
+        _ => bail!("--modes {text}: a number of modes from 1, or all, is needed"),
+    }
+}
+
+/// Gate tables.
+fn tables(paths: &[PathBuf]) -> Result<Clusters> {
+    let tables: Vec<GateTable> = paths.iter().map(|path| GateTable::load(path)).collect::<Result<_>>()?;
+    for table in &tables[1..] {
+        ensure!(
+            table.header.len() == tables[0].header.len(),
+            "{} has {} columns and {} has {}: laps are compared coordinate by coordinate",
+            table.path.display(),
+            table.header.len(),
+            tables[0].path.display(),
+            tables[0].header.len()
+        );
+    }
+    let cluster = |table: &GateTable| {
+        Cluster::new(&table.name, &table.rows).with_context(|| table.path.display().to_string())
+    };
+    Ok(Clusters {
+        list: tables.iter().map(cluster).collect::<Result<_>>()?,
+        inputs: tables.into_iter().map(|table| table.input).collect(),
+        course: None,
+    })
+}
+
+/// Data sets and single runs; each circuit is prepared once.
+fn data_sets(session: &Session, args: &Compare) -> Result<Clusters> {
+    let mut circuits: BTreeMap<(String, usize), Arc<Circuit>> = BTreeMap::new();
+    let (mut list, mut inputs, mut runs) = (Vec::new(), Vec::new(), Vec::new());
+    for path in &args.data {
+        interrupt::check()?;
+        let set = load(path)?;
+        let source = set.world_source(args.world.as_deref())?;
+        let gates = set.declared_config(&Config::shipped())?.run.gates;
+        let key = (source.text.clone(), gates);
+        if !circuits.contains_key(&key) {
+            circuits.insert(key.clone(), setup::circuit(&source, gates)?);
+            ensure!(
+                circuits.len() == 1,
+                "{}: its world or its gates differ from those of {}: laps are compared gate by gate",
+                path.display(),
+                args.data[0].display()
+            );
+        }
+        let measured = Measured::on(set, Arc::clone(&circuits[&key]))?;
+        measured.runs.iter().flat_map(SampledRun::remarks).for_each(|remark| session.remark(&remark));
+        list.extend(measured.clusters()?);
+        inputs.extend(measured.set.inputs);
+        runs.extend(measured.runs);
+    }
+    let course = circuits.into_values().next().map(|circuit| (circuit, runs));
+    Ok(Clusters { list, inputs, course })
+}
+
+/// A folder is a data set, a file one run.
+fn load(path: &Path) -> Result<DataSet> {
+    if path.is_file() && !path.ends_with(dataset::DESCRIPTION) {
+        dataset::load_run_csv(path)
+    } else {
+        DataSet::load(path)
+    }
+}
+
+fn compare(session: &Session, pdm: &Pdm, clusters: &[Cluster], modes: Modes, permutations: u32) -> Result<Value> {
+    let projections: Vec<pdm::Projection> =
+        clusters.iter().map(|cluster| pdm.project(cluster, modes)).collect::<Result<_, _>>()?;
+    let used = projections.first().map_or(0, |p| p.points().ncols());
+    let pair_count = clusters.len() * clusters.len().saturating_sub(1) / 2;
+    let progress = session.progress("comparing", pair_count as u64);
+    let mut pairs = Vec::with_capacity(pair_count);
+    for (i, a) in projections.iter().enumerate() {
+        for (j, b) in projections.iter().enumerate().skip(i + 1) {
+            interrupt::check()?;
+            let t = pdm::hotelling(a, b)?;
+            let mut pair = json!({
+                "a": a.name(), "b": b.name(), "distance": t.distance, "t2": t.t2,
+                "f": t.f, "df1": t.df1, "df2": t.df2, "p": t.p,
+            });
+            if permutations > 0 {
+                let energy = pdm::energy_test(&clusters[i], &clusters[j], permutations as usize, session.seed())?;
+                pair["energy"] = test(&energy);
+            }
+            pairs.push(pair);
+            progress.tick(1);
+        }
+    }
+    Ok(json!({
+        "clusters": clusters.iter().map(|c| json!({ "name": c.name(), "laps": c.len() })).collect::<Vec<_>>(),
+        "gates": clusters.first().map_or(0, Cluster::dimension),
+        "modes": used,
+        "explained": pdm.explained(),
+        "eigenvalues": pdm.eigenvalues(),
+        "pairs": pairs,
+    }))
+}
+
+fn test(result: &TestResult) -> Value {
+    json!({ "statistic": result.statistic, "p": result.p, "method": result.method })
+}
+
+fn pairs_csv(document: &Value) -> String {
+    let mut csv = String::from("a,b,distance,t2,f,df1,df2,p,energy_p\n");
+    for pair in document["pairs"].as_array().into_iter().flatten() {
+        let names = ["a", "b"].map(|key| pair[key].as_str().unwrap_or("").to_owned());
+        let numbers = ["distance", "t2", "f", "df1", "df2", "p"].map(|key| pair[key].to_string());
+        let energy = pair["energy"]["p"].as_f64().map_or(String::new(), |p| p.to_string());
+        csv += &format!("{},{},{energy}\n", names.join(","), numbers.join(","));
+    }
+    csv
+}
+
+fn text(document: &Value) -> String {
+    let explained: Vec<String> = document["explained"]
+        .as_array()
+        .into_iter()
+        .flatten()
+        .take(5)
+        .map(|share| format!("{:.1} %", 100.0 * share.as_f64().unwrap_or(0.0)))
+        .collect();
+    let mut text = format!(
+        "{} laps in {} clusters, {} gates; variance in the first modes: {}\n\n",
+        document["clusters"].as_array().into_iter().flatten().filter_map(|c| c["laps"].as_u64()).sum::<u64>(),
+        document["clusters"].as_array().map_or(0, Vec::len),
+        document["gates"],
+        explained.join(", "),
+    );
+    let title = format!("Inter-cluster distances in {} modes (eq. 8), Hotelling's and the energy test", document["modes"]);
+    let mut table = Table::new(title, &["a", "b", "distance", "T2", "F", "df", "p", "energy p"]);
+    for pair in document["pairs"].as_array().into_iter().flatten() {
+        let number = |key: &str| pair[key].as_f64().unwrap_or(f64::NAN);
+        table.push([
+            pair["a"].as_str().unwrap_or("").to_owned(),
+            pair["b"].as_str().unwrap_or("").to_owned(),
+            format!("{:.2}", number("distance")),
+            format!("{:.2}", number("t2")),
+            format!("{:.2}", number("f")),
+            format!("{}, {}", pair["df1"], pair["df2"]),
+            probability(number("p")),
+            pair["energy"]["p"].as_f64().map_or("-".into(), probability),
+        ]);
+    }
+    text += &table.to_text();
+    text
+}

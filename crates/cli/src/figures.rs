@@ -1,0 +1,128 @@
+//! Drawings that several commands share. Lengths across the track are in mm here, as in the reports.
+
+use anyhow::Result;
+use chart::{
+    Aspect, Axis, Color, Ellipse, Figure, Fill, GAP, Legend, Mark, Marker, Panel, Shape, Side, Style, palette,
+};
+use pdm::{Modes, Pdm, Projection, covariance_ellipse};
+use sim::Circuit;
+use track::{Course, Wall};
+
+use crate::laps::SampledRun;
+
+/// Millimetres in a metre.
+pub(crate) const MM: f64 = 1000.0;
+
+/// The outlines of both walls.
+pub(crate) fn walls(course: &Course) -> Mark {
+    let outline = |wall: &Wall| {
+        (0..=600).map(|i| wall.point(f64::from(i) / 600.0)).map(|p| [p.x, p.y]).chain([GAP]).collect::<Vec<_>>()
+    };
+    let points = [outline(&course.outer), outline(&course.inner)].concat();
+    Mark::new("", Style { width_px: 1.6, ..Style::color(Color::INK) }, Shape::Line(points))
+}
+
+/// The joints of the walls' b-splines.
+pub(crate) fn joints(course: &Course) -> Mark {
+    let points = course.outer.joints().chain(course.inner.joints()).map(|p| [p.x, p.y]).collect();
+    let style = Style { marker: Marker::Square, fill: Fill::Solid, size_px: 7.0, ..Style::color(Color::INK) };
+    Mark::new("joints of the b-splines", style, Shape::Points(points))
+}
+
+/// All gates, from wall to wall.
+pub(crate) fn gates(circuit: &Circuit) -> Mark {
+    let ends = |gate: &track::Gate| {
+        let (left, right) = (gate.center + gate.left * gate.left_m, gate.center - gate.left * gate.right_m);
+        [[left.x, left.y], [right.x, right.y]]
+    };
+    let style = Style { width_px: 0.7, ..Style::color(Color::GREY) };
+    Mark::new("gates", style, Shape::Segments(circuit.gates.iter().map(ends).collect()))
+}
+
+/// Where a lap crosses the gates, m.
+pub(crate) fn crossings(circuit: &Circuit, offsets_m: &[f64]) -> Vec<[f64; 2]> {
+    let at = |(gate, offset): (&track::Gate, &f64)| {
+        let p = gate.center + gate.left * *offset;
+        [p.x, p.y]
+    };
+    circuit.gates.iter().zip(offsets_m).map(at).collect()
+}
+
+/// A map with equal scales.
+pub(crate) fn map(title: impl Into<String>, marks: Vec<Mark>) -> Panel {
+    Panel {
+        title: title.into(),
+        x: Axis::linear("x, m"),
+        y: Axis::linear("y, m"),
+        marks,
+        aspect: Aspect::Equal,
+        size_px: [520.0, 440.0],
+        ..Panel::default()
+    }
+}
+
+/// One panel as a figure.
+pub(crate) fn single(title: &str, description: &str, panel: Panel) -> Figure {
+    Figure {
+        title: title.into(),
+        description: description.into(),
+        panels: vec![panel],
+        legend: Side::Right,
+        ..Figure::default()
+    }
+}
+
+/// The laps of several runs over the walls; a lap's path is its positions at the gates.
+pub(crate) fn laps_map(circuit: &Circuit, runs: &[SampledRun]) -> Figure {
+    let mut marks = vec![walls(&circuit.course)];
+    for (i, run) in runs.iter().enumerate() {
+        let lap = |lap: &track::Lap| {
+            let mut points = crossings(circuit, &lap.offsets_m);
+            points.extend([points[0], GAP]);
+            points
+        };
+        let points: Vec<[f64; 2]> = run.laps.iter().flat_map(lap).collect();
+        let style = Style { width_px: 0.7, opacity: 0.6, ..Style::color(palette(i)) };
+        marks.push(Mark::new(format!("run {}", run.run), style, Shape::Line(points)));
+    }
+    single("Laps", "Every lap kept, drawn through its positions at the gates.", map("", marks))
+}
+
+/// A cluster in the plane of the first two modes: its laps and the ellipse of two standard deviations.
+pub(crate) fn cluster_marks(projection: &Projection, label: &str, style: Style) -> Vec<Mark> {
+    let points = projection.points();
+    let laps = (0..points.nrows()).map(|k| [MM * points[(k, 0)], MM * points[(k, 1)]]).collect();
+    let mut marks = vec![Mark::new(label, style, Shape::Points(laps))];
+    if let Ok(ellipse) = covariance_ellipse(projection, 2.0) {
+        let shape = Shape::Ellipses(vec![Ellipse {
+            center: ellipse.centre.map(|c| MM * c),
+            semi_axes: ellipse.semi_axes.map(|a| MM * a),
+            angle_rad: ellipse.angle_rad,
+        }]);
+        marks.push(Mark::new("", Style { width_px: 1.0, opacity: 0.9, fill: Fill::Open, ..style }, shape));
+    }
+    marks
+}
+
+/// The axes of the plane of the first two modes.
+pub(crate) fn modes_panel(title: &str, pdm: &Pdm, marks: Vec<Mark>) -> Panel {
+    let axis = |mode: usize| {
+        let share = 100.0 * pdm.explained().get(mode).copied().unwrap_or(0.0);
+        Axis::linear(format!("mode {}, mm ({share:.0} % of the variance)", mode + 1))
+    };
+    Panel { title: title.into(), x: axis(0), y: axis(1), marks, legend: Legend::Shared, ..Panel::default() }
+}
+
+/// All clusters of a PDM in the plane of its first two modes.
+pub(crate) fn modes_figure(pdm: &Pdm, clusters: &[pdm::Cluster]) -> Result<Figure> {
+    let mut marks = Vec::new();
+    for (i, cluster) in clusters.iter().enumerate() {
+        let projection = pdm.project(cluster, Modes::First(2))?;
+        marks.extend(cluster_marks(&projection, cluster.name(), Style::series(i)));
+    }
+    Ok(single(
+        "Point Distribution Model",
+        "Every lap in the plane of the first two modes, with an ellipse of two standard deviations round each cluster.",
+        modes_panel("", pdm, marks),
+    ))
+}

@@ -1,0 +1,182 @@
+//! Laps at the gates, from files and from simulations.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use anyhow::{Context, Result, bail};
+use pdm::Cluster;
+use rayon::prelude::*;
+use sim::{Circuit, Drive, Streams, Vec2};
+use track::{Lap, LapTracker, Way};
+
+use crate::config::Config;
+use crate::dataset::{DataSet, RunFile};
+use crate::setup::{self, Setup};
+
+/// The laps of one run that are analysed, and what was set aside.
+#[derive(Debug, Clone)]
+pub(crate) struct SampledRun {
+    /// `<data set>/<run>`.
+    pub(crate) name: String,
+    /// The name of the run alone.
+    pub(crate) run: String,
+    /// Closed laps, the first whole lap of the run not among them.
+    pub(crate) laps: Vec<Lap>,
+    /// Whole laps that missed a gate: number of the lap from 1 (the dropped one is 0) and the gate.
+    pub(crate) set_aside: Vec<(usize, usize)>,
+    /// Laps asked for.
+    pub(crate) wanted: usize,
+    /// Whether the run ended because gate 0 was not crossed for too long.
+    pub(crate) timed_out: bool,
+}
+
+impl SampledRun {
+    /// The laps to keep among all whole laps of a run, in order: the first is dropped, those that miss a gate are set
+    /// aside, and of the others the first `wanted` kept.
+    pub(crate) fn new(set: &str, run: &str, whole: &[Lap], wanted: usize) -> Self {
+        let mut laps = Vec::with_capacity(wanted);
+        let mut set_aside = Vec::new();
+        for (number, lap) in whole.iter().enumerate().skip(1) {
+            if laps.len() == wanted {
+                break;
+            }
+            match lap.missed.first() {
+                Some(&gate) => set_aside.push((number, gate)),
+                None => laps.push(lap.clone()),
+            }
+        }
+        Self {
+            name: format!("{set}/{run}"),
+            run: run.to_owned(),
+            laps,
+            set_aside,
+            wanted,
+            timed_out: false,
+        }
+    }
+
+    /// Positions at the gates, laps x gates, m.
+    pub(crate) fn offsets_m(&self) -> Vec<Vec<f64>> {
+        self.laps.iter().map(|lap| lap.offsets_m.clone()).collect()
+    }
+
+    /// The laps as a cluster.
+    ///
+    /// # Errors
+    /// No lap at all.
+    pub(crate) fn cluster(&self) -> Result<Cluster> {
+        Cluster::new(&self.name, &self.offsets_m()).with_context(|| format!("run {}", self.name))
+    }
+
+    /// Lap times, s.
+    pub(crate) fn lap_times_s(&self) -> Vec<f64> {
+        self.laps.iter().map(Lap::duration_s).collect()
+    }
+
+    /// What a user must know of laps that are not there, if anything.
+    pub(crate) fn remarks(&self) -> Vec<String> {
+        let mut remarks: Vec<String> = self
+            .set_aside
+            .iter()
+            .map(|(lap, gate)| format!("{}: lap {lap} misses gate {gate} and is set aside", self.name))
+            .collect();
+        if self.laps.len() < self.wanted {
+            let ending = if self.timed_out { " (the run timed out)" } else { "" };
+            remarks.push(format!("{}: {} of {} laps{ending}", self.name, self.laps.len(), self.wanted));
+        }
+        remarks
+    }
+}
+
+/// A measured data set, sampled.
+#[derive(Debug, Clone)]
+pub(crate) struct Measured {
+    pub(crate) set: DataSet,
+    pub(crate) circuit: Arc<Circuit>,
+    pub(crate) runs: Vec<SampledRun>,
+}
+
+impl Measured {
+    /// The laps of a data set on its circuit.
+    ///
+    /// # Errors
+    /// A world that cannot be found, a run without a whole lap after its first.
+    pub(crate) fn new(set: DataSet, world: Option<&Path>) -> Result<Self> {
+        let config = set.declared_config(&Config::shipped())?;
+        let circuit = setup::circuit(&set.world_source(world)?, config.run.gates)?;
+        Self::on(set, circuit)
+    }
+
+    /// The laps of a data set on a circuit that is at hand.
+    ///
+    /// # Errors
+    /// A run without a whole lap after its first.
+    pub(crate) fn on(set: DataSet, circuit: Arc<Circuit>) -> Result<Self> {
+        let config = set.declared_config(&Config::shipped())?;
+        let way = setup::way(&config, &circuit.course);
+        let runs = set.runs.par_iter().map(|run| sample(&set, run, &circuit, way)).collect::<Result<_>>()?;
+        Ok(Self { set, circuit, runs })
+    }
+
+    /// Each run as a cluster.
+    pub(crate) fn clusters(&self) -> Result<Vec<Cluster>> {
+        self.runs.iter().map(SampledRun::cluster).collect()
+    }
+
+    /// The observed positions of one kept lap, for drawing, m.
+    pub(crate) fn path(&self, run: usize, lap: usize) -> Vec<[f64; 2]> {
+        let lap = &self.runs[run].laps[lap];
+        let rows = &self.set.runs[run].rows;
+        let inside = |t: f64| t >= lap.start_s - 1e-9 && t <= lap.end_s + 1e-9;
+        rows.t_s.iter().zip(&rows.position_m).filter(|(t, _)| inside(**t)).filter_map(|(_, p)| *p).collect()
+    }
+}
+
+fn sample(set: &DataSet, run: &RunFile, circuit: &Circuit, way: Way) -> Result<SampledRun> {
+    let mut tracker = LapTracker::new(&circuit.gates, way);
+    let seen = run.rows.t_s.iter().zip(&run.rows.position_m).filter_map(|(t, p)| p.map(|p| (*t, p)));
+    let whole: Vec<Lap> = seen.filter_map(|(t, [x, y])| tracker.push(t, Vec2::new(x, y))).collect();
+    let sampled = SampledRun::new(&set.name, &run.name, &whole, set.laps);
+    if sampled.laps.is_empty() {
+        let path = run.path.display();
+        if let Some((lap, gate)) = sampled.set_aside.first() {
+            bail!("{path}: no lap crosses all gates: lap {lap} misses gate {gate}; is this the world it was driven in?");
+        }
+        bail!(
+            "{path}: {} whole laps, and the first is not analysed: at least two are needed; check the world, the \
+             driving direction ([declared] run.direction in dataset.toml) and the unit of x_m and y_m",
+            whole.len()
+        );
+    }
+    Ok(sampled)
+}
+
+/// Simulates several runs, in parallel; run `i` has the streams of run `i`.
+///
+/// # Errors
+/// What the simulator refuses.
+pub(crate) fn simulate(setup: &Setup, name: &str, seed: u64, runs: usize, laps: usize) -> Result<Vec<SampledRun>> {
+    (0..runs)
+        .into_par_iter()
+        .map(|run| {
+            let drive = setup.drive(Streams { seed, run: run as u64 }, laps, |_| {})?;
+            Ok(simulated(name, run, &drive, laps))
+        })
+        .collect()
+}
+
+/// The sampled laps of a simulated run.
+pub(crate) fn simulated(name: &str, run: usize, drive: &Drive, wanted: usize) -> SampledRun {
+    // The simulator has dropped the first lap already; any lap stands in its place here.
+    let whole: Vec<Lap> = drive.laps.first().into_iter().chain(&drive.laps).cloned().collect();
+    let sampled = SampledRun::new(name, &crate::dataset::run_name(run), &whole, wanted);
+    SampledRun { timed_out: drive.timed_out, ..sampled }
+}
+
+/// Mean and standard deviation (divisor n - 1).
+pub(crate) fn mean_and_deviation(values: &[f64]) -> (f64, f64) {
+    let n = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / n;
+    let squares: f64 = values.iter().map(|v| (v - mean) * (v - mean)).sum();
+    (mean, (squares / (n - 1.0)).sqrt())
+}

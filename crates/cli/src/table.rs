@@ -1,0 +1,88 @@
+//! Tables as text, Markdown and HTML.
+
+use std::fmt::Write as _;
+
+/// Named columns and rows of words.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(crate) struct Table {
+    /// What stands above it; may be empty.
+    pub(crate) title: String,
+    pub(crate) columns: Vec<String>,
+    pub(crate) rows: Vec<Vec<String>>,
+}
+
+impl Table {
+    pub(crate) fn new(title: impl Into<String>, columns: &[&str]) -> Self {
+        Self { title: title.into(), columns: columns.iter().map(|c| (*c).to_owned()).collect(), rows: Vec::new() }
+    }
+
+    pub(crate) fn push(&mut self, row: impl IntoIterator<Item = impl Into<String>>) {
+        self.rows.push(row.into_iter().map(Into::into).collect());
+    }
+
+    /// For a terminal: the first column to the left, the others to the right.
+    pub(crate) fn to_text(&self) -> String {
+        let width = |i: usize| {
+            let cells = self.rows.iter().filter_map(|row| row.get(i));
+            cells.chain(self.columns.get(i)).map(|cell| cell.chars().count()).max().unwrap_or(0)
+        };
+        let widths: Vec<usize> = (0..self.columns.len()).map(width).collect();
+        let line = |cells: &[String]| {
+            let padded = cells.iter().zip(&widths).enumerate().map(|(i, (cell, &width))| {
+                if i == 0 { format!("{cell:<width$}") } else { format!("{cell:>width$}") }
+            });
+            padded.collect::<Vec<_>>().join("  ").trim_end().to_owned()
+        };
+        let mut text = String::new();
+        if !self.title.is_empty() {
+            let _ = writeln!(text, "{}", self.title);
+        }
+        let _ = writeln!(text, "{}", line(&self.columns));
+        let _ = writeln!(text, "{}", "-".repeat(widths.iter().sum::<usize>() + 2 * widths.len().saturating_sub(1)));
+        for row in &self.rows {
+            let _ = writeln!(text, "{}", line(row));
+        }
+        text
+    }
+
+    /// As an HTML table; the title is its caption.
+    pub(crate) fn to_html(&self) -> String {
+        let cells = |tag: &str, row: &[String]| {
+            row.iter().map(|cell| format!("<{tag}>{}</{tag}>", escape(cell))).collect::<String>()
+        };
+        let mut html = String::from("<table>\n");
+        if !self.title.is_empty() {
+            let _ = writeln!(html, "<caption>{}</caption>", escape(&self.title));
+        }
+        let _ = writeln!(html, "<thead><tr>{}</tr></thead>\n<tbody>", cells("th", &self.columns));
+        for row in &self.rows {
+            let _ = writeln!(html, "<tr>{}</tr>", cells("td", row));
+        }
+        html.push_str("</tbody></table>\n");
+        html
+    }
+}
+
+/// Text as it may stand in HTML.
+pub(crate) fn escape(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+}
+
+/// A probability as a reader wants it: three decimals, or the power of ten of a small one.
+pub(crate) fn probability(p: f64) -> String {
+    if p >= 0.001 { format!("{p:.3}") } else { format!("{p:.0e}") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn text_is_aligned_and_html_escaped() {
+        let mut table = Table::new("T", &["run", "d"]);
+        table.push(["a & b", "1.0"]);
+        table.push(["c", "10.0"]);
+        assert_eq!(table.to_text(), "T\nrun       d\n-----------\na & b   1.0\nc      10.0\n");
+        assert!(table.to_html().contains("<td>a &amp; b</td>"));
+    }
+}
