@@ -19,7 +19,7 @@ mod world;
 
 pub use cast::{Caster, CasterKind, Hits, LANES, Rays, segment_distance_m};
 pub use controller::Controller;
-pub use effects::{EFFECTS, Effect, Hit, Moment, Param, Pattern, Setting, Spec, Stage, find};
+pub use effects::{EFFECTS, Effect, Hit, Moment, Param, Pattern, Setting, Site, Spec, Stage, find};
 pub use error::Error;
 pub use model::{Machine, Model, RunRules, WallRules};
 pub use noise::{Stream, Streams};

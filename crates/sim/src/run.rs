@@ -33,6 +33,7 @@ pub struct Run<'w> {
     sights: Vec<Sight>,
     effects: Vec<Active>,
     drifting: bool,
+    weighs_rays: bool,
     pose: Pose,
     steps: u64,
     next_gate: usize,
@@ -72,6 +73,7 @@ impl<'w> Run<'w> {
             machine: world.machine.clone(),
             sights: sights(&world.machine),
             drifting: effects.iter().any(Active::drifts),
+            weighs_rays: effects.iter().any(|active| active.effect.weighs_rays()),
             effects,
             pose,
             steps: 0,
@@ -108,6 +110,8 @@ impl<'w> Run<'w> {
             pose: self.pose,
             command: WheelSpeeds::default(),
             gate: self.next_gate,
+            gate_count: self.world.circuit().gates.len(),
+            arena_middle: self.world.arena_middle(),
         };
         let observed = self.observe(&now);
         let readings = self.sense(&now);
@@ -146,7 +150,7 @@ impl<'w> Run<'w> {
     fn sense(&mut self, now: &Moment) -> Readings {
         let mut readings = self.responses();
         for active in &mut self.effects {
-            active.effect.readings(&active.values, now, &mut readings);
+            active.effect.readings(&active.values, now, &self.machine, &mut readings);
         }
         let noise = self.machine.noise;
         for reading in &mut readings {
@@ -162,39 +166,59 @@ impl<'w> Run<'w> {
     /// The response of each sensor to what its rays meet.
     #[inline]
     fn responses(&self) -> Readings {
-        let machine = &self.machine;
+        match self.machine.beam.combine {
+            Combine::Responses => self.mean_response(),
+            Combine::Distances => self.response_of_mean_distance(),
+        }
+    }
+
+    /// Weighted mean of the responses of each sensor's rays.
+    #[inline]
+    fn mean_response(&self) -> Readings {
+        let Machine { range_m, response, .. } = &self.machine;
         let mut total = [0.0; LANES];
         for sight in &self.sights {
-            let rays = self.rays(sight);
-            let hits = self.geometry.caster.cast(&self.geometry.walls, self.pose.position, &rays);
-            let values = match machine.beam.combine {
-                Combine::Responses => self.ray_responses(&rays, &hits),
-                Combine::Distances => hits.distance_m.map(|distance| distance.min(machine.range_m)),
-            };
+            let (rays, hits) = self.look(sight);
+            let mut values = hits.distance_m.map(|d| if d <= *range_m { response.reading(d) } else { 0.0 });
+            if self.weighs_rays {
+                for lane in (0..LANES).filter(|&lane| hits.distance_m[lane] <= *range_m) {
+                    values[lane] *= self.ray_factor(&rays, &hits, lane);
+                }
+            }
             for lane in 0..LANES {
                 total[lane] += sight.weight * values[lane];
             }
         }
-        match machine.beam.combine {
-            Combine::Responses => total,
-            // A mean that is as far as the range is of rays that all see nothing.
-            Combine::Distances => total
-                .map(|d| if d < machine.range_m * (1.0 - 1e-12) { machine.response.reading(d) } else { 0.0 }),
-        }
+        total
     }
 
-    fn ray_responses(&self, rays: &Rays, hits: &Hits) -> Readings {
-        let machine = &self.machine;
-        let mut values =
-            hits.distance_m.map(|d| if d <= machine.range_m { machine.response.reading(d) } else { 0.0 });
-        if self.effects.iter().any(|active| active.effect.weighs_rays()) {
+    /// Response of the weighted mean of each sensor's distances, times the mean of what effects make of its rays.
+    #[inline]
+    fn response_of_mean_distance(&self) -> Readings {
+        let Machine { range_m, response, .. } = &self.machine;
+        let (mut mean, mut factor) = ([0.0; LANES], [1.0; LANES]);
+        for sight in &self.sights {
+            let (rays, hits) = self.look(sight);
             for lane in 0..LANES {
-                if values[lane] > 0.0 {
-                    values[lane] *= self.ray_factor(rays, hits, lane);
+                mean[lane] += sight.weight * hits.distance_m[lane].min(*range_m);
+            }
+            if self.weighs_rays {
+                for lane in (0..LANES).filter(|&lane| hits.distance_m[lane] <= *range_m) {
+                    factor[lane] += sight.weight * (self.ray_factor(&rays, &hits, lane) - 1.0);
                 }
             }
         }
-        values
+        // A mean that is as far as the range is of rays that all see nothing.
+        let seen = |d: f64| d < range_m * (1.0 - 1e-12);
+        std::array::from_fn(|i| if seen(mean[i]) { factor[i] * response.reading(mean[i]) } else { 0.0 })
+    }
+
+    /// The rays of a sight and what they hit.
+    #[inline]
+    fn look(&self, sight: &Sight) -> (Rays, Hits) {
+        let rays = self.rays(sight);
+        let hits = self.geometry.caster.cast(&self.geometry.walls, self.pose.position, &rays);
+        (rays, hits)
     }
 
     /// What the effects make of one ray's response.
@@ -205,9 +229,8 @@ impl<'w> Run<'w> {
         let hit = Hit {
             sensor: lane,
             distance_m: hits.distance_m[lane],
-            cos_incidence: walls.normal(segment).dot(direction).abs(),
-            place,
-            wall_length_m: self.world.circuit().course.wall(place.side).length_m(),
+            cos_incidence: walls.normal(segment).dot(direction).abs().min(1.0),
+            site: self.world.scene.site(place),
         };
         self.effects.iter().map(|active| active.effect.ray_factor(&active.values, &hit)).product()
     }

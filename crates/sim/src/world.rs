@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
-use track::{Chain, Course, Gates, Side, Vec2, Vertex, Way};
+use track::{Chain, Course, Direction, Gates, Side, Vec2, Vertex, Way};
 
 use crate::cast::{Caster, CasterKind, Cells};
-use crate::effects::Active;
+use crate::effects::{Active, Site};
 use crate::{Error, Machine, Model, RunRules, WallPlace, WallRules, Walls};
 
 /// A course with its gates.
@@ -124,18 +124,28 @@ impl Scene {
         Arc::new(Geometry::new(Walls::new(outer, inner, self.rules.thickness_m), self.kind, machine))
     }
 
+    /// What there is to know of a place on a wall.
+    pub(crate) fn site(&self, place: WallPlace) -> Site {
+        let course = &self.circuit.course;
+        let outside_is_left = (course.direction == Direction::Clockwise) == (place.side == Side::Outer);
+        Site {
+            place,
+            wall_length_m: course.wall(place.side).length_m(),
+            outward: if outside_is_left { 1.0 } else { -1.0 },
+        }
+    }
+
     /// One wall's chain with its vertices moved, or `None` where nothing moves it.
     fn moved(&self, side: Side, effects: &[Active]) -> Option<Chain> {
         let wall = self.circuit.course.wall(side);
-        let length_m = wall.length_m();
-        let place = |fraction: f64| WallPlace { side, fraction };
+        let site = |vertex: &Vertex| self.site(WallPlace { side, fraction: vertex.fraction });
         let displacement_m = |vertex: &Vertex| -> f64 {
-            let at = place(vertex.fraction);
-            effects.iter().map(|active| active.effect.displacement_m(&active.values, at, length_m)).sum()
+            let at = site(vertex);
+            effects.iter().map(|active| active.effect.displacement_m(&active.values, &at)).sum()
         };
         let divides = |a: &Vertex, b: &Vertex| {
-            let piece = (place(a.fraction), place(b.fraction));
-            effects.iter().any(|active| active.effect.divides(&active.values, piece, length_m))
+            let (from, to) = (site(a), site(b));
+            effects.iter().any(|active| active.effect.divides(&active.values, &from, &to))
         };
         let chain = if side == Side::Outer { &self.outer } else { &self.inner };
         let mut vertices = Vec::with_capacity(chain.vertices.len());
@@ -209,6 +219,12 @@ impl World<'_> {
     /// Time of a lap along the midline at the controller's speed, s.
     pub fn nominal_lap_s(&self) -> f64 {
         self.circuit().gates.midline_length_m() / self.machine.controller.speed_m_s()
+    }
+
+    /// The middle of the arena, m.
+    pub(crate) fn arena_middle(&self) -> Vec2 {
+        let [width_m, height_m] = self.circuit().course.arena_m;
+        Vec2::new(0.5 * width_m, 0.5 * height_m)
     }
 
     /// Unit vector in which this run crosses a gate.

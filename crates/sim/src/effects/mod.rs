@@ -5,8 +5,13 @@
 //! the robot.
 
 mod act;
+mod decide;
+mod observe;
+mod plain;
+mod rays;
 mod sense;
 mod setting;
+mod world;
 
 use std::fmt::Debug;
 
@@ -17,8 +22,52 @@ pub use setting::{Pattern, Setting};
 
 use crate::{Machine, Pose, Readings, Twist, WallPlace, WheelSpeeds};
 
-/// Every effect the simulator knows, in the order in which they act.
-pub const EFFECTS: &[Spec] = &[sense::READING_GAIN, sense::AMBIENT_OFFSET, act::SLIP_LEVEL];
+/// Every effect the simulator knows, in the order in which they act. Wall effects add up and may stand anywhere.
+pub const EFFECTS: &[Spec] = &[
+    rays::CONE_OF_VIEW,
+    rays::DISTANCE_SCALE,
+    rays::RESPONSE_EXPONENT,
+    rays::SENSOR_ROTATION,
+    rays::SENSOR_REACH,
+    rays::INCIDENCE_FALLOFF,
+    sense::READING_GAIN,
+    sense::ONE_SENSOR_GAIN,
+    sense::READING_DRIFT,
+    sense::AMBIENT_OFFSET,
+    sense::ONE_SENSOR_OFFSET,
+    sense::DIRECTIONAL_LIGHT,
+    sense::CROSSTALK,
+    sense::SENSOR_LAG,
+    sense::READING_NOISE,
+    sense::READING_STEP,
+    decide::CONTROLLER_GAIN,
+    decide::CONTROLLER_SPEED,
+    act::COMMAND_DELAY,
+    act::DEAD_BAND,
+    act::SPEED_STEP,
+    act::MOTOR_LAG,
+    act::ACCELERATION_LIMIT,
+    act::SLIP_LEVEL,
+    act::SLIP_MEMORY,
+    act::WHEEL_ASYMMETRY,
+    act::WHEEL_SCALE,
+    act::BATTERY_SAG,
+    act::AXLE_LENGTH,
+    act::TURN_SCRUB,
+    act::FLOOR_TILT,
+    world::OUTER_WALL_OFFSET,
+    world::INNER_WALL_OFFSET,
+    world::WALL_BUMP,
+    rays::OUTER_WALL_REFLECTANCE,
+    rays::INNER_WALL_REFLECTANCE,
+    rays::REFLECTANCE_PATCH,
+    observe::MARKER_OFFSET,
+    observe::CAMERA_DISTORTION,
+    observe::CAMERA_SCALE,
+    observe::CAMERA_ROTATION,
+    observe::CAMERA_OFFSET,
+    observe::CAMERA_NOISE,
+];
 
 /// Stage of the control loop.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -63,22 +112,38 @@ pub struct Param {
     pub high: f64,
     /// The names of the values 0, 1, ... of a parameter that is no number.
     pub choices: &'static [&'static str],
+    /// Whether only whole numbers mean something.
+    pub whole: bool,
 }
 
 impl Param {
     /// A number with the value at which the effect does nothing.
-    pub const fn new(name: &'static str, unit: &'static str, neutral: f64, low: f64, high: f64) -> Self {
-        Self { name, unit, neutral: Some(neutral), low, high, choices: &[] }
+    pub const fn new(
+        name: &'static str,
+        unit: &'static str,
+        neutral: f64,
+        low: f64,
+        high: f64,
+    ) -> Self {
+        let place = Self::place(name, unit, low, high);
+        Self { neutral: Some(neutral), ..place }
     }
 
-    /// A number that says where or which.
+    /// A number that says where or which, or has no value at which the effect does nothing.
     pub const fn place(name: &'static str, unit: &'static str, low: f64, high: f64) -> Self {
-        Self { name, unit, neutral: None, low, high, choices: &[] }
+        Self { name, unit, neutral: None, low, high, choices: &[], whole: false }
+    }
+
+    /// One of the numbers 0, 1, ..., `count` - 1.
+    pub const fn number_of(name: &'static str, count: usize) -> Self {
+        let place = Self::place(name, "", 0.0, (count - 1) as f64);
+        Self { whole: true, ..place }
     }
 
     /// One of several names.
     pub const fn choice(name: &'static str, choices: &'static [&'static str]) -> Self {
-        Self { name, unit: "", neutral: None, low: 0.0, high: (choices.len() - 1) as f64, choices }
+        let number = Self::number_of(name, choices.len());
+        Self { choices, ..number }
     }
 }
 
@@ -93,6 +158,8 @@ pub struct Spec {
     pub summary: &'static str,
     /// Its parameters, in the order in which the hooks get their values.
     pub params: &'static [Param],
+    /// A parameter with any number of values, which come after those of `params`.
+    pub list: Option<Param>,
     /// A fresh state, once per run.
     pub build: fn() -> Box<dyn Effect>,
 }
@@ -128,10 +195,33 @@ pub struct Moment {
     pub command: WheelSpeeds,
     /// Number of the gate that is next.
     pub gate: usize,
+    /// Number of gates.
+    pub gate_count: usize,
+    /// The middle of the arena, m.
+    pub arena_middle: Vec2,
+}
+
+/// A place on a wall and what there is to know of it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Site {
+    /// The place on the exact wall.
+    pub place: WallPlace,
+    /// Length of that wall, m.
+    pub wall_length_m: f64,
+    /// 1 where the left of the driving direction is away from the corridor, -1 where it is towards it.
+    pub outward: f64,
+}
+
+impl Site {
+    /// Arc length from here to a place on the same wall, the shorter way round, m.
+    pub fn arc_m(&self, fraction: f64) -> f64 {
+        let ahead = (fraction - self.place.fraction).rem_euclid(1.0);
+        ahead.min(1.0 - ahead) * self.wall_length_m
+    }
 }
 
 /// Where a ray met a wall.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Hit {
     /// Number of the sensor.
     pub sensor: usize,
@@ -140,9 +230,7 @@ pub struct Hit {
     /// Cosine of the angle between the ray and the wall's normal, in [0, 1].
     pub cos_incidence: f64,
     /// The place on the exact wall.
-    pub place: WallPlace,
-    /// Length of that wall, m.
-    pub wall_length_m: f64,
+    pub site: Site,
 }
 
 /// Hooks into the tick. Each gets the values of the effect's parameters in the order of its [`Spec`]; each does
@@ -151,11 +239,11 @@ pub trait Effect: Debug + Send {
     /// Changes constants of the machine.
     fn machine(&self, _values: &[f64], _machine: &mut Machine) {}
     /// How far the wall is moved here, m, positive to the left of the driving direction.
-    fn displacement_m(&self, _values: &[f64], _at: WallPlace, _wall_length_m: f64) -> f64 {
+    fn displacement_m(&self, _values: &[f64], _at: &Site) -> f64 {
         0.0
     }
     /// Whether the straight piece between two places must be divided before it is moved.
-    fn divides(&self, _values: &[f64], _piece: (WallPlace, WallPlace), _wall_length_m: f64) -> bool {
+    fn divides(&self, _values: &[f64], _from: &Site, _to: &Site) -> bool {
         false
     }
     /// Factor on the response of one ray; asked only where [`Effect::weighs_rays`] says so.
@@ -167,7 +255,14 @@ pub trait Effect: Debug + Send {
         false
     }
     /// Changes the readings before noise.
-    fn readings(&mut self, _values: &[f64], _now: &Moment, _readings: &mut Readings) {}
+    fn readings(
+        &mut self,
+        _values: &[f64],
+        _now: &Moment,
+        _machine: &Machine,
+        _readings: &mut Readings,
+    ) {
+    }
     /// Changes the readings after noise, before they are cut to the scale.
     fn noisy_readings(&mut self, _values: &[f64], _readings: &mut Readings) {}
     /// Changes the speeds that the wheels are driven at, once per physics step.

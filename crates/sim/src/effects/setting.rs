@@ -1,6 +1,6 @@
 //! An effect with the values of its parameters, constant, by run or by time.
 
-use super::{EFFECTS, Effect, Spec};
+use super::{EFFECTS, Effect, Param, Spec};
 use crate::Error;
 use crate::sensor::check;
 
@@ -50,26 +50,53 @@ impl Setting {
         }
     }
 
-    /// Nothing, if every value is in its parameter's range. `index` is the place in the list of effects.
+    /// Nothing, if there is a value for every parameter and each is in its range. `index` is the place in the list
+    /// of effects.
     ///
     /// # Errors
-    /// The first value that is not.
+    /// The first value that is missing, out of range or not whole where only whole numbers mean something.
     pub fn check(&self, index: usize) -> Result<(), Error> {
-        let lists: Vec<&Vec<f64>> = match &self.pattern {
-            Pattern::Constant(values) | Pattern::ByTime { start: values, .. } => vec![values],
-            Pattern::ByRun(runs) => runs.iter().collect(),
-        };
-        for values in lists {
-            for (param, &value) in self.spec.params.iter().zip(values) {
-                check(&format!("effect.{index}.{}", param.name), value, param.low, param.high)?;
+        match &self.pattern {
+            Pattern::Constant(values) => self.check_values(index, values),
+            Pattern::ByRun(runs) => {
+                runs.iter().try_for_each(|values| self.check_values(index, values))
+            }
+            Pattern::ByTime { start, per_s } => {
+                self.check_values(index, start)?;
+                self.check_count(index, per_s)?;
+                self.params().zip(per_s).try_for_each(|(param, &slope)| {
+                    check(&format!("effect.{index}.{}_per_s", param.name), slope, -1e6, 1e6)
+                })
             }
         }
-        if let Pattern::ByTime { per_s, .. } = &self.pattern {
-            for (param, &value) in self.spec.params.iter().zip(per_s) {
-                check(&format!("effect.{index}.{}_per_s", param.name), value, -1e6, 1e6)?;
+    }
+
+    /// The parameter of each value, for ever where the last is a list.
+    pub(crate) fn params(&self) -> impl Iterator<Item = &'static Param> {
+        let list = self.spec.list.iter().cycle();
+        self.spec.params.iter().chain(list)
+    }
+
+    fn check_values(&self, index: usize, values: &[f64]) -> Result<(), Error> {
+        self.check_count(index, values)?;
+        self.params().zip(values).try_for_each(|(param, &value)| {
+            let key = format!("effect.{index}.{}", param.name);
+            check(&key, value, param.low, param.high)?;
+            if param.whole && value.fract() != 0.0 {
+                let reason = format!("{value} given, a whole number expected");
+                return Err(Error::Invalid { key, reason });
             }
+            Ok(())
+        })
+    }
+
+    fn check_count(&self, index: usize, values: &[f64]) -> Result<(), Error> {
+        let (needed, given) = (self.spec.params.len(), values.len());
+        if given == needed || given > needed && self.spec.list.is_some() {
+            return Ok(());
         }
-        Ok(())
+        let reason = format!("{} needs {needed} values, not {given}", self.spec.name);
+        Err(Error::Invalid { key: format!("effect.{index}"), reason })
     }
 
     /// The place of the effect in the signal's way through the robot; an effect outside the registry comes last.
@@ -84,6 +111,7 @@ pub(crate) struct Active {
     pub(crate) values: Vec<f64>,
     start: Vec<f64>,
     per_s: Option<Vec<f64>>,
+    params: Vec<&'static Param>,
     pub(crate) effect: Box<dyn Effect>,
 }
 
@@ -101,6 +129,7 @@ impl Active {
             values: start.to_vec(),
             start: start.to_vec(),
             per_s: per_s.map(<[f64]>::to_vec),
+            params: setting.params().take(start.len()).collect(),
             effect: (setting.spec.build)(),
         })
     }
@@ -110,12 +139,12 @@ impl Active {
         self.per_s.is_some()
     }
 
-    /// Moves the values to a time since the run began.
+    /// Moves the values to a time since the run began; each stops at the end of its parameter's range.
     pub(crate) fn advance(&mut self, time_s: f64) {
-        if let Some(per_s) = &self.per_s {
-            for ((value, start), slope) in self.values.iter_mut().zip(&self.start).zip(per_s) {
-                *value = start + slope * time_s;
-            }
+        let Some(per_s) = &self.per_s else { return };
+        for (i, param) in self.params.iter().enumerate() {
+            let value = (self.start[i] + per_s[i] * time_s).clamp(param.low, param.high);
+            self.values[i] = if param.whole { value.round() } else { value };
         }
     }
 }

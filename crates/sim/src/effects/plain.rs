@@ -1,0 +1,96 @@
+//! Effects that are one function of their values and remember nothing.
+
+use track::Vec2;
+
+use super::{Effect, Hit, Moment};
+use crate::{Machine, Readings, Twist, WheelSpeeds};
+
+/// Changes constants of the machine.
+#[derive(Debug)]
+pub(super) struct OnMachine(pub(super) fn(&[f64], &mut Machine));
+
+impl Effect for OnMachine {
+    fn machine(&self, values: &[f64], machine: &mut Machine) {
+        (self.0)(values, machine);
+    }
+}
+
+/// Changes the readings before noise.
+#[derive(Debug)]
+pub(super) struct OnReadings(pub(super) fn(&[f64], &Moment, &mut Readings));
+
+impl Effect for OnReadings {
+    fn readings(
+        &mut self,
+        values: &[f64],
+        now: &Moment,
+        _machine: &Machine,
+        readings: &mut Readings,
+    ) {
+        (self.0)(values, now, readings);
+    }
+}
+
+/// A factor on the response of each ray.
+#[derive(Debug)]
+pub(super) struct OnRays(pub(super) fn(&[f64], &Hit) -> f64);
+
+impl Effect for OnRays {
+    fn weighs_rays(&self) -> bool {
+        true
+    }
+    fn ray_factor(&self, values: &[f64], hit: &Hit) -> f64 {
+        (self.0)(values, hit)
+    }
+}
+
+/// Changes the speed that each wheel is driven at.
+#[derive(Debug)]
+pub(super) struct OnDrive(pub(super) fn(&[f64], f64) -> f64);
+
+impl Effect for OnDrive {
+    fn drive(&mut self, values: &[f64], _now: &Moment, wheels: WheelSpeeds) -> WheelSpeeds {
+        wheels.map(|speed| (self.0)(values, speed))
+    }
+}
+
+/// Changes the speeds of the wheels over the ground.
+#[derive(Debug)]
+pub(super) struct OnGround(pub(super) fn(&[f64], &Moment, WheelSpeeds) -> WheelSpeeds);
+
+impl Effect for OnGround {
+    fn ground(&mut self, values: &[f64], now: &Moment, wheels: WheelSpeeds) -> WheelSpeeds {
+        (self.0)(values, now, wheels)
+    }
+}
+
+/// Changes the yaw rate, rad/s.
+#[derive(Debug)]
+pub(super) struct OnYaw(pub(super) fn(&[f64], f64) -> f64);
+
+impl Effect for OnYaw {
+    fn twist(&mut self, values: &[f64], _now: &Moment, twist: Twist) -> Twist {
+        let yaw_rad_s = (self.0)(values, twist.yaw_rad_s);
+        Twist { yaw_rad_s, ..twist }
+    }
+}
+
+/// A velocity added to the robot's, m/s.
+#[derive(Debug)]
+pub(super) struct OnDrift(pub(super) fn(&[f64]) -> Vec2);
+
+impl Effect for OnDrift {
+    fn drift_m_s(&self, values: &[f64], _now: &Moment) -> Vec2 {
+        (self.0)(values)
+    }
+}
+
+/// By how much the camera sees a position elsewhere, m.
+#[derive(Debug)]
+pub(super) struct OnCamera(pub(super) fn(&[f64], &Moment, Vec2) -> Vec2);
+
+impl Effect for OnCamera {
+    fn observed(&self, values: &[f64], now: &Moment, position: Vec2) -> Vec2 {
+        position + (self.0)(values, now, position)
+    }
+}
