@@ -74,7 +74,9 @@ pub(crate) struct Settings {
 
 /// Both experiments of section IV: the two controllers, the sensor models, the wall approximation, the wheel slip,
 /// and all of them together; every table of the paper beside ours, every figure, and each claim with its numbers.
-#[derive(Debug, Default, Args)]
+///
+/// Example: lapwing reproduce --seeds 100 --out report
+#[derive(Debug, Args)]
 pub(crate) struct Reproduce {
     /// Measured data set; give one per controller [default: the laps that are shipped]
     #[arg(long, value_name = "DIR")]
@@ -82,12 +84,21 @@ pub(crate) struct Reproduce {
     /// Folder for the report [default: lapwing-report]
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
-    /// Simulations with seeds of their own behind every confidence interval
-    #[arg(long, default_value_t = 40, value_name = "N", value_parser = clap::value_parser!(u32).range(2..))]
+    /// How often everything is simulated, each time with random numbers of its own: what the intervals rest on
+    #[arg(long, default_value_t = SEEDS, value_name = "N", value_parser = clap::value_parser!(u32).range(2..))]
     pub(crate) seeds: u32,
-    /// The declared model as JSON on stdout too
+    /// Print tables.json instead of tables
     #[arg(long)]
     pub(crate) json: bool,
+}
+
+/// Of `--seeds` of [`Reproduce`].
+const SEEDS: u32 = 40;
+
+impl Default for Reproduce {
+    fn default() -> Self {
+        Self { measured: Vec::new(), out: None, seeds: SEEDS, json: false }
+    }
 }
 
 /// Simulates runs of laps and writes them as a data set that `compare` reads.
@@ -199,7 +210,7 @@ pub(crate) enum World {
         /// World file, or the name of a shipped world
         world: PathBuf,
         /// Maximal distances of a segment from the exact wall, m
-        #[arg(long, required = true, value_delimiter = ',', value_name = "M,...")]
+        #[arg(long, required = true, value_delimiter = ',', value_name = "M,...", allow_negative_numbers = true)]
         max_error: Vec<f64>,
         /// Print one JSON document
         #[arg(long)]

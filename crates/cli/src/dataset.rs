@@ -3,6 +3,7 @@
 mod csv_file;
 mod description;
 mod read;
+mod source;
 mod write;
 
 use std::path::{Path, PathBuf};
@@ -16,6 +17,7 @@ use crate::output::Input;
 
 pub(crate) use csv_file::CsvFile;
 pub(crate) use description::Kind;
+use source::{Shipped, Source};
 pub(crate) use write::{DataSetToWrite, dataset_toml, run_csv, run_name, write_dataset};
 
 /// What describes a data set.
@@ -92,10 +94,22 @@ impl DataSet {
             let shown = folder.display();
             bail!("{shown} is not a folder; a data set is a folder with {DESCRIPTION} in it");
         }
-        let (mut set, names) = description::load(folder)?;
+        Self::from_source(Source::Folder(folder))
+    }
+
+    /// The laps of a controller that are shipped with this program.
+    ///
+    /// # Errors
+    /// None, as a test shows.
+    pub(crate) fn shipped(controller: ControllerKind) -> Result<Self> {
+        Self::from_source(Source::Shipped(Shipped::of(controller)))
+    }
+
+    fn from_source(source: Source<'_>) -> Result<Self> {
+        let (mut set, names) = description::load(source)?;
         let runs: Vec<_> = names
             .into_par_iter()
-            .map(|(name, path)| load_run(name, path))
+            .map(|(name, path)| load_run(source, name, path))
             .collect();
         for run in runs {
             let (run, input) = run?;
@@ -127,8 +141,10 @@ impl DataSet {
             bail!("no {shown} names the world of this run; name its file with --world");
         }
         let world = self.world.as_deref().unwrap_or_default();
-        world_source(world, Some(&description), override_path)
-            .with_context(|| format!("data set {}", self.name))
+        world_source(world, Some(&description), override_path).map_err(|error| match override_path {
+            Some(_) => error,
+            None => error.context(format!("{}: `world`", description.display())),
+        })
     }
 }
 
@@ -139,19 +155,20 @@ impl DataSet {
 /// As [`DataSet::load`].
 pub(crate) fn load_run_csv(path: &Path) -> Result<DataSet> {
     let folder = folder_of(path);
-    let mut set = if folder.join(DESCRIPTION).is_file() {
-        description::load(folder)?.0
+    let source = Source::Folder(folder);
+    let mut set = if source.holds(DESCRIPTION) {
+        description::load(source)?.0
     } else {
         description::nameless(folder)
     };
-    let (run, input) = load_run(run_name_of(path), path.to_owned())?;
+    let (run, input) = load_run(source, run_name_of(path), path.to_owned())?;
     set.runs.push(run);
     set.inputs.push(input);
     Ok(set)
 }
 
-fn load_run(name: String, path: PathBuf) -> Result<(RunFile, Input)> {
-    let (rows, input) = read::run(&path)?;
+fn load_run(source: Source<'_>, name: String, path: PathBuf) -> Result<(RunFile, Input)> {
+    let (rows, input) = read::run(&path, &source.read(&path)?)?;
     Ok((RunFile { name, path, rows }, input))
 }
 

@@ -2,7 +2,7 @@
 
 use anyhow::Result;
 use chart::{
-    Aspect, Axis, Color, Ellipse, Figure, Fill, GAP, Legend, Mark, Marker, Panel, Shape, Side, Style, palette,
+    Aspect, Axis, Color, Dash, Ellipse, Figure, Fill, GAP, Legend, Mark, Marker, Panel, Shape, Side, Style, palette,
 };
 use pdm::{Modes, Pdm, Projection, covariance_ellipse};
 use sim::Circuit;
@@ -125,4 +125,92 @@ pub(crate) fn modes_figure(pdm: &Pdm, clusters: &[pdm::Cluster]) -> Result<Figur
         "Every lap in the plane of the first two modes, with an ellipse of two standard deviations round each cluster.",
         modes_panel("", pdm, marks),
     ))
+}
+
+/// How a measured run looks: grey and open, so that simulations stand out.
+pub(crate) fn measured(run: usize) -> Style {
+    let shade = [0.0, 0.45][run % 2];
+    let color = Color::INK.mix(Color::WHITE, shade);
+    Style { width_px: 1.2, size_px: 6.0, marker: Marker::series(run), ..Style::color(color) }
+}
+
+/// How a simulation looks: solid and in colour.
+pub(crate) fn simulated(variant: usize) -> Style {
+    let markers = [Marker::Circle, Marker::Square, Marker::Diamond, Marker::Triangle, Marker::TriangleDown];
+    let marker = markers[variant % markers.len()];
+    Style { fill: Fill::Solid, size_px: 6.0, width_px: 0.8, opacity: 0.85, marker, ..Style::color(palette(variant)) }
+}
+
+/// Laps as they were seen, each a line.
+pub(crate) fn paths(label: &str, style: Style, paths: &[Vec<[f64; 2]>]) -> Mark {
+    let points = paths.iter().flat_map(|path| path.iter().copied().chain([GAP])).collect();
+    Mark::new(label, style, Shape::Line(points))
+}
+
+/// A cluster as it stands in a drawing of the modes.
+#[derive(Debug, Clone)]
+pub(crate) struct Shown<'a> {
+    pub(crate) projection: &'a Projection,
+    pub(crate) label: String,
+    pub(crate) style: Style,
+}
+
+/// These clusters in the plane of the first two modes.
+pub(crate) fn plane(title: &str, pdm: &Pdm, clusters: &[Shown<'_>]) -> Panel {
+    let marks = clusters.iter().flat_map(|shown| cluster_marks(shown.projection, &shown.label, shown.style));
+    Panel { size_px: [380.0, 300.0], ..modes_panel(title, pdm, marks.collect()) }
+}
+
+/// These clusters in the plane of the first two modes, and beside it a close-up of those that `near` picks.
+pub(crate) fn plane_and_close_up(title: &str, pdm: &Pdm, clusters: &[Shown<'_>], near: &[usize]) -> Figure {
+    let all = plane("all clusters", pdm, clusters);
+    let mut close = plane("close-up", pdm, clusters);
+    let boxes: Vec<[[f64; 2]; 2]> = near.iter().map(|&i| reach(clusters[i].projection)).collect();
+    let range = |axis: usize| {
+        let low = boxes.iter().map(|b| b[axis][0]).fold(f64::INFINITY, f64::min);
+        let high = boxes.iter().map(|b| b[axis][1]).fold(f64::NEG_INFINITY, f64::max);
+        let margin = 0.06 * (high - low);
+        Some([low - margin, high + margin])
+    };
+    (close.x.range, close.y.range) = (range(0), range(1));
+    Figure {
+        title: title.into(),
+        description: "Every lap in the plane of the first two modes, with an ellipse of two standard deviations round \
+                      each cluster; at the right a close-up."
+            .into(),
+        panels: vec![all, close],
+        columns: 2,
+        legend: Side::Below,
+        ..Figure::default()
+    }
+}
+
+/// How far a cluster with its ellipse reaches along the first two modes, mm.
+fn reach(projection: &Projection) -> [[f64; 2]; 2] {
+    let points = projection.points();
+    [0, 1].map(|mode| {
+        let column = points.column(mode);
+        let (mean, deviation) = (column.mean(), column.variance().sqrt());
+        let (low, high) = (column.min().min(mean - 2.2 * deviation), column.max().max(mean + 2.2 * deviation));
+        [MM * low, MM * high]
+    })
+}
+
+/// Positions across the track against the gate, mm, positive to the left.
+pub(crate) fn across(curves: &[(String, Vec<f64>, Style)]) -> Panel {
+    let curve = |(label, offsets_m, style): &(String, Vec<f64>, Style)| {
+        let points = offsets_m.iter().enumerate().map(|(gate, offset_m)| [gate as f64, MM * offset_m]).collect();
+        Mark::new(label, *style, Shape::Line(points))
+    };
+    Panel {
+        x: Axis { range: curves.first().map(|(_, offsets_m, _)| [0.0, offsets_m.len() as f64]), ..Axis::linear("gate") },
+        y: Axis::linear("position on the gate, mm (left of its centre: positive)"),
+        marks: curves.iter().map(curve).collect(),
+        ..Panel::default()
+    }
+}
+
+/// A line in this style, of this pattern and width.
+pub(crate) fn line(color: Color, dash: Dash, width_px: f64) -> Style {
+    Style { dash, width_px, ..Style::color(color) }
 }

@@ -102,12 +102,12 @@ mod tests {
             ),
             (
                 "a,b\n1,2\n1,x\n",
-                "laps.of.mine.csv:3: b: `x` is not a finite number; leave the field empty if it is \
-                 missing",
+                "laps.of.mine.csv:3: b: `x` is not a finite number; one is needed here",
             ),
             (
                 "a,b\n1,2,3\n",
-                "laps.of.mine.csv:2: 3 fields under a header of 2",
+                "laps.of.mine.csv:2: 3 fields under a header of 2; give every row as many, empty where a value is \
+                 missing",
             ),
         ] {
             assert_eq!(load(text).unwrap_err(), expected);

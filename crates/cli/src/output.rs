@@ -10,7 +10,7 @@ use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::Write;
 use std::path::{Component, Path, PathBuf};
 
-use anyhow::{Context, Result, bail, ensure};
+use anyhow::{Context, Result, anyhow, bail, ensure};
 use serde::{Deserialize, Serialize};
 
 pub(crate) use manifest::{Input, Manifest, sha256};
@@ -104,8 +104,7 @@ impl OutDir {
     /// Names the file and the cause, a full disk for example.
     pub(crate) fn write(&self, name: &str, bytes: impl AsRef<[u8]>) -> Result<()> {
         let path = self.at(name)?;
-        write_whole(&path, bytes.as_ref())
-            .with_context(|| format!("cannot write {}", path.display()))
+        write_whole(&path, bytes.as_ref()).map_err(|error| unwritable(&path, &error))
     }
 
     /// A file of this folder, such as earlier work left it; `None` if it is not there.
@@ -276,16 +275,25 @@ fn refuse_other_work(partial: &Path, work: &Work) -> Result<()> {
 
 /// Makes `DIR.partial` with its marker, locked.
 fn start(partial: &Path, work: &Work) -> Result<File> {
-    let cannot = || format!("cannot create {}", partial.display());
-    fs::create_dir_all(partial).with_context(cannot)?;
-    let marker = File::create(partial.join(MARKER)).with_context(cannot)?;
+    let cannot = |error| {
+        let shown = partial.display();
+        anyhow!("cannot create {shown}: {error}; name a folder with --out that can be written to")
+    };
+    fs::create_dir_all(partial).map_err(cannot)?;
+    let marker = File::create(partial.join(MARKER)).map_err(cannot)?;
     let mut marker = lock(marker, partial)?;
     let json = serde_json::to_vec(work).expect("two strings have a form in JSON");
-    let written = marker.write_all(&json).with_context(cannot);
+    let written = marker.write_all(&json).map_err(|error| unwritable(partial, &error));
     if written.is_err() {
         let _ = fs::remove_dir_all(partial); // the error to report is the first one
     }
     written.map(|()| marker)
+}
+
+/// What to say of a file under `--out` that cannot be written.
+pub(crate) fn unwritable(path: &Path, error: &std::io::Error) -> anyhow::Error {
+    let shown = path.display();
+    anyhow!("cannot write {shown}: {error}; make room there, or name another folder with --out")
 }
 
 /// By way of a temporary name, so that a killed run leaves no half file for `--resume`.

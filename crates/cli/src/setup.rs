@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, anyhow};
 use sim::{
     Beam, CasterKind, Circuit, Drive, Machine, Model, Mount, Pattern, ReadingNoise, Response, Robot, RunRules, Scene,
     Setting, Step, Streams, Vec2, WallRules,
@@ -25,8 +25,8 @@ impl Setup {
     /// The setup of a model file; `world` is that of `--world`.
     pub(crate) fn load(file: &ModelFile, world: Option<&Path>, caster: Option<CasterKind>) -> Result<Self> {
         let source = file.world(world)?;
-        let circuit = circuit(&source, file.config.run.gates)?;
-        Self::new(&file.config, circuit, caster).map_err(|error| locate(file, error))
+        let circuit = model_circuit(file, &source)?;
+        Self::new(&file.config, circuit, caster).map_err(|error| locate(file, &source, error))
     }
 
     /// The setup of a configuration on a circuit.
@@ -52,12 +52,30 @@ impl Setup {
     }
 }
 
-/// An error of the simulator with the place in the file where its key was set.
-fn locate(file: &ModelFile, error: sim::Error) -> anyhow::Error {
-    match error.key() {
-        Some(key) => file.located(key, &error),
-        None => error.into(),
+/// The keys of the model that may be to blame for an error.
+pub(crate) fn blamed(error: &sim::Error) -> Vec<&str> {
+    match error {
+        sim::Error::TooNarrow { .. } => vec!["robot.body_radius_m", "wall.thickness_m"],
+        _ => error.key().into_iter().collect(),
     }
+}
+
+/// An error of the simulator with the place in the file where its key was set, or else the world.
+pub(crate) fn locate(file: &ModelFile, world: &WorldSource, error: sim::Error) -> anyhow::Error {
+    match error.key().or_else(|| blamed(&error).into_iter().find(|key| file.names(key))) {
+        Some(key) => file.located(key, &error),
+        None => anyhow!("{}: {error}", world.label),
+    }
+}
+
+/// The circuit of a model; what is wrong with the number of gates is said where that was set.
+pub(crate) fn model_circuit(file: &ModelFile, world: &WorldSource) -> Result<Arc<Circuit>> {
+    let gates = file.config.run.gates;
+    let circuit = Circuit::new(course(world)?, gates).map_err(|error| match file.names("run.gates") {
+        true => file.located("run.gates", format!("run.gates = {gates}: {error}")),
+        false => anyhow!("{}: {error}", world.label),
+    })?;
+    Ok(Arc::new(circuit))
 }
 
 /// The course of a world file with its gates.
@@ -69,9 +87,9 @@ pub(crate) fn circuit(source: &WorldSource, gates: usize) -> Result<Arc<Circuit>
 
 /// The course of a world file; an error says which line of it.
 pub(crate) fn course(source: &WorldSource) -> Result<Course> {
-    Course::from_toml(&source.text).map_err(|error| match error.line() {
-        Some(line) => anyhow::anyhow!("{}:{line}: {error}", source.label),
-        None => anyhow::anyhow!("{}: {error}", source.label),
+    Course::from_toml(&source.text).map_err(|error| match error {
+        track::Error::At { line, what } => anyhow!("{}:{line}: {what}", source.label),
+        other => anyhow!("{}: {other}", source.label),
     })
 }
 

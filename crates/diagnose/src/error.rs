@@ -23,4 +23,10 @@ pub enum Error {
     /// Pairs that every response of the family fits alike.
     #[error("the pairs do not determine a, d0 and p: measure below and above the distance where the reading falls to half")]
     Undetermined,
+    /// Laps that the declared model cannot complete.
+    #[error("the declared model does not complete its laps: nothing can be traced from it; look at `lapwing drive` with the same settings")]
+    DeclaredModelStops,
+    /// Too few simulated laps for the number of coordinates.
+    #[error("too few laps for the number of gates: more runs or more laps are needed")]
+    TooFewLaps,
 }

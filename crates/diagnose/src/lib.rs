@@ -2,9 +2,13 @@
 
 mod candidate;
 mod error;
+mod laps;
 mod least_squares;
+mod log;
 mod response_fit;
 
 pub use candidate::Candidate;
 pub use error::Error;
+pub use laps::{Atlas, Diagnosis, Explanation, FourNumbers, Quadratic, Simulate, Verdict, debug as laps_debug};
+pub use log::{LogRow, debug_screen};
 pub use response_fit::{Estimate, ResponseFit};

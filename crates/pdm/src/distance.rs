@@ -143,14 +143,14 @@ mod tests {
         let [one, two, three] = [1, 2, 3].map(|laps| projection("p", &gaussian(1, laps, 2)));
         let refusal = |x: &Projection, y: &Projection| distance(x, y).unwrap_err().to_string();
         let expected =
-            "`p` has 1, `p` has 3: 2 coordinates need at least 2 laps each and 4 together";
+            "`p` has 1 lap, `p` has 3 laps: 2 modes or gates need at least 2 laps each and 4 together; give more laps or compare in fewer modes";
         assert_eq!(refusal(&one, &three), expected);
         let wide = projection("w", &gaussian(1, 3, 5));
         let expected =
-            "`w` has 3, `w` has 3: 5 coordinates need at least 2 laps each and 7 together";
+            "`w` has 3 laps, `w` has 3 laps: 5 modes or gates need at least 2 laps each and 7 together; give more laps or compare in fewer modes";
         assert_eq!(refusal(&wide, &wide), expected);
         assert_eq!(refusal(&two, &wide), "`w` has 5 coordinates, `p` has 2");
-        let expected = "`p` has 2: 2 coordinates need at least 3 laps each and 3 together";
+        let expected = "`p` has 2 laps: 2 modes or gates need at least 3 laps each and 3 together; give more laps or compare in fewer modes";
         assert_eq!(
             mahalanobis(&[0.0, 0.0], &two).unwrap_err().to_string(),
             expected

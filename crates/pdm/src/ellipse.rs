@@ -13,6 +13,14 @@ pub struct Ellipse {
     pub angle_rad: f64,
 }
 
+impl Ellipse {
+    /// What it encloses, in the square of the laps' unit.
+    #[must_use]
+    pub fn area(&self) -> f64 {
+        std::f64::consts::PI * self.semi_axes[0] * self.semi_axes[1]
+    }
+}
+
 /// The points at Mahalanobis distance `sigmas` from the cluster in its first two modes (eq. 6).
 ///
 /// Of a Gaussian cluster the share `1 - exp(-sigmas^2 / 2)` lies inside. A cluster that stands still gives a point.
@@ -30,10 +38,7 @@ pub struct Ellipse {
 pub fn covariance_ellipse(projection: &Projection, sigmas: f64) -> Result<Ellipse, Error> {
     let available = projection.points().ncols();
     if available < 2 {
-        return Err(Error::Modes {
-            wanted: 2,
-            available,
-        });
+        return Err(Error::Modes { wanted: 2, available });
     }
     if !sigmas.is_finite() || sigmas <= 0.0 {
         return Err(Error::Sigmas { sigmas });
@@ -98,13 +103,10 @@ mod tests {
         let refusal = covariance_ellipse(&point, 1.0).unwrap_err().to_string();
         assert_eq!(
             refusal,
-            "`point` has 1: 1 coordinates need at least 2 laps each and 2 together"
+            "`point` has 1 lap: 1 modes or gates need at least 2 laps each and 2 together; give more laps or compare in fewer modes"
         );
         let still = Projection::new("still", &[vec![1.0, 2.0], vec![1.0, 2.0]]).unwrap();
-        assert_eq!(
-            covariance_ellipse(&still, 1.0).unwrap().semi_axes,
-            [0.0, 0.0]
-        );
+        assert_eq!(covariance_ellipse(&still, 1.0).unwrap().semi_axes, [0.0, 0.0]);
         assert_eq!(
             covariance_ellipse(&still, 0.0),
             Err(Error::Sigmas { sigmas: 0.0 })

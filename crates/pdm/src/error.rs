@@ -51,7 +51,10 @@ pub enum Error {
         expected: usize,
     },
     /// Fewer laps than the covariance of so many coordinates needs.
-    #[error("{}: {coordinates} coordinates need at least {each} laps each and {total} together", list(.laps))]
+    #[error(
+        "{}: {coordinates} modes or gates need at least {each} laps each and {total} together; give more laps or compare in \
+         fewer modes", list(.laps)
+    )]
     TooFewLaps {
         /// The clusters and how many laps each has.
         laps: Vec<(String, usize)>,
@@ -118,7 +121,10 @@ pub enum Error {
 fn list(laps: &[(String, usize)]) -> String {
     let each: Vec<_> = laps
         .iter()
-        .map(|(name, count)| format!("`{name}` has {count}"))
+        .map(|(name, count)| match count {
+            1 => format!("`{name}` has 1 lap"),
+            _ => format!("`{name}` has {count} laps"),
+        })
         .collect();
     each.join(", ")
 }

@@ -23,6 +23,7 @@
 //! ```
 
 mod cluster;
+mod contrast;
 mod covariance;
 mod decomposition;
 mod distance;
@@ -37,6 +38,7 @@ mod projection;
 mod samples;
 
 pub use cluster::Cluster;
+pub use contrast::covariance_contrast;
 pub use distance::{distance, mahalanobis};
 pub use ellipse::{Ellipse, covariance_ellipse};
 pub use error::Error;

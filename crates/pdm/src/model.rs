@@ -294,7 +294,7 @@ mod tests {
         );
         assert_eq!(
             refusal(&[&one]),
-            "`one` has 1: 3 coordinates need at least 1 laps each and 2 together"
+            "`one` has 1 lap: 3 modes or gates need at least 1 laps each and 2 together; give more laps or compare in fewer modes"
         );
         assert_eq!(
             refusal(&[&one, &two]),

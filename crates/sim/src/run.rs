@@ -35,6 +35,7 @@ pub struct Run<'w> {
     drifting: bool,
     weighs_rays: bool,
     pose: Pose,
+    command: WheelSpeeds,
     steps: u64,
     next_gate: usize,
     stretch: u64,
@@ -46,10 +47,9 @@ pub struct Run<'w> {
 
 /// The rays that one ray of the beam makes on all eight sensors, in the body frame.
 #[derive(Debug, Clone, Copy)]
-struct Sight {
-    origin: [Vec2; LANES],
-    direction: [Vec2; LANES],
-    weight: f64,
+pub(crate) struct Sight {
+    pub(crate) rays: Rays,
+    pub(crate) weight: f64,
 }
 
 impl<'w> Run<'w> {
@@ -61,8 +61,10 @@ impl<'w> Run<'w> {
         let mut start = streams.open("start");
         let gates = &world.circuit().gates;
         let gate = start.index(gates.len());
-        let (offset_m, turn_rad) =
-            (world.rules().start_offset_m * start.symmetric(), world.rules().start_heading_rad * start.symmetric());
+        let (offset_m, turn_rad) = (
+            world.rules().start_offset_m * start.symmetric(),
+            world.rules().start_heading_rad * start.symmetric(),
+        );
         let forward = world.forward(gate);
         let center = gates[gate].center + gates[gate].left * offset_m;
         let pose = Pose::new(center.x, center.y, forward.y.atan2(forward.x) + turn_rad);
@@ -76,6 +78,7 @@ impl<'w> Run<'w> {
             weighs_rays: effects.iter().any(|active| active.effect.weighs_rays()),
             effects,
             pose,
+            command: WheelSpeeds::default(),
             steps: 0,
             next_gate: gate,
             stretch: 0,
@@ -108,17 +111,26 @@ impl<'w> Run<'w> {
             time_s,
             step_s: self.world.rules().control_step_s,
             pose: self.pose,
-            command: WheelSpeeds::default(),
+            command: self.command,
             gate: self.next_gate,
             gate_count: self.world.circuit().gates.len(),
             arena_middle: self.world.arena_middle(),
         };
         let observed = self.observe(&now);
         let readings = self.sense(&now);
-        now.command = self.machine.robot.limit(self.machine.controller.command(&readings));
+        now.command = self
+            .machine
+            .robot
+            .limit(self.machine.controller.command(&readings));
+        self.command = now.command;
         self.act(now);
         self.steps += 1;
-        Step { time_s, observed, readings, command: now.command }
+        Step {
+            time_s,
+            observed,
+            readings,
+            command: now.command,
+        }
     }
 
     /// Brings the values that change in time, and what depends on them, up to date.
@@ -136,10 +148,9 @@ impl<'w> Run<'w> {
     /// Where the camera sees the robot.
     #[inline]
     fn observe(&mut self, now: &Moment) -> Vec2 {
-        let seen = self
-            .effects
-            .iter()
-            .fold(self.pose.position, |position, active| active.effect.observed(&active.values, now, position));
+        let seen = self.effects.iter().fold(self.pose.position, |position, active| {
+            active.effect.observed(&active.values, now, position)
+        });
         let noise_m = self.machine.camera_noise_m;
         let (x, y) = (self.camera.normal(), self.camera.normal());
         seen + Vec2::new(x, y) * noise_m
@@ -148,13 +159,17 @@ impl<'w> Run<'w> {
     /// The eight readings.
     #[inline]
     fn sense(&mut self, now: &Moment) -> Readings {
+        // Drawn first: the processor casts the rays meanwhile.
+        let normals: Readings = std::array::from_fn(|_| self.sense.normal());
         let mut readings = self.responses();
         for active in &mut self.effects {
-            active.effect.readings(&active.values, now, &self.machine, &mut readings);
+            active
+                .effect
+                .readings(&active.values, now, &self.machine, &mut readings);
         }
         let noise = self.machine.noise;
-        for reading in &mut readings {
-            *reading += noise.deviation(*reading) * self.sense.normal();
+        for (reading, normal) in readings.iter_mut().zip(normals) {
+            *reading += noise.deviation(*reading) * normal;
         }
         for active in &mut self.effects {
             active.effect.noisy_readings(&active.values, &mut readings);
@@ -175,11 +190,16 @@ impl<'w> Run<'w> {
     /// Weighted mean of the responses of each sensor's rays.
     #[inline]
     fn mean_response(&self) -> Readings {
-        let Machine { range_m, response, .. } = &self.machine;
+        let Machine {
+            range_m, response, ..
+        } = &self.machine;
         let mut total = [0.0; LANES];
         for sight in &self.sights {
             let (rays, hits) = self.look(sight);
-            let mut values = hits.distance_m.map(|d| if d <= *range_m { response.reading(d) } else { 0.0 });
+            let mut values = response.readings(&hits.distance_m);
+            for (value, distance_m) in values.iter_mut().zip(hits.distance_m) {
+                *value = if distance_m <= *range_m { *value } else { 0.0 };
+            }
             if self.weighs_rays {
                 for lane in (0..LANES).filter(|&lane| hits.distance_m[lane] <= *range_m) {
                     values[lane] *= self.ray_factor(&rays, &hits, lane);
@@ -195,12 +215,14 @@ impl<'w> Run<'w> {
     /// Response of the weighted mean of each sensor's distances, times the mean of what effects make of its rays.
     #[inline]
     fn response_of_mean_distance(&self) -> Readings {
-        let Machine { range_m, response, .. } = &self.machine;
+        let Machine {
+            range_m, response, ..
+        } = &self.machine;
         let (mut mean, mut factor) = ([0.0; LANES], [1.0; LANES]);
         for sight in &self.sights {
             let (rays, hits) = self.look(sight);
-            for lane in 0..LANES {
-                mean[lane] += sight.weight * hits.distance_m[lane].min(*range_m);
+            for (mean, d) in mean.iter_mut().zip(hits.distance_m) {
+                *mean += sight.weight * d.min(*range_m);
             }
             if self.weighs_rays {
                 for lane in (0..LANES).filter(|&lane| hits.distance_m[lane] <= *range_m) {
@@ -210,14 +232,18 @@ impl<'w> Run<'w> {
         }
         // A mean that is as far as the range is of rays that all see nothing.
         let seen = |d: f64| d < range_m * (1.0 - 1e-12);
-        std::array::from_fn(|i| if seen(mean[i]) { factor[i] * response.reading(mean[i]) } else { 0.0 })
+        let values = response.readings(&mean);
+        std::array::from_fn(|i| if seen(mean[i]) { factor[i] * values[i] } else { 0.0 })
     }
 
     /// The rays of a sight and what they hit.
     #[inline]
     fn look(&self, sight: &Sight) -> (Rays, Hits) {
-        let rays = self.rays(sight);
-        let hits = self.geometry.caster.cast(&self.geometry.walls, self.pose.position, &rays);
+        let rays = sight.rays.placed(self.pose);
+        let hits = self
+            .geometry
+            .caster
+            .cast(&self.geometry.walls, self.pose.position, &rays);
         (rays, hits)
     }
 
@@ -232,27 +258,10 @@ impl<'w> Run<'w> {
             cos_incidence: walls.normal(segment).dot(direction).abs().min(1.0),
             site: self.world.scene.site(place),
         };
-        self.effects.iter().map(|active| active.effect.ray_factor(&active.values, &hit)).product()
-    }
-
-    /// Rays of the body frame in the world.
-    #[inline]
-    fn rays(&self, sight: &Sight) -> Rays {
-        let Pose { position, heading } = self.pose;
-        let mut rays = Rays {
-            origin_x: [0.0; LANES],
-            origin_y: [0.0; LANES],
-            direction_x: [0.0; LANES],
-            direction_y: [0.0; LANES],
-        };
-        for lane in 0..LANES {
-            let (origin, direction) = (sight.origin[lane], sight.direction[lane]);
-            rays.origin_x[lane] = position.x + (heading.x * origin.x - heading.y * origin.y);
-            rays.origin_y[lane] = position.y + (heading.y * origin.x + heading.x * origin.y);
-            rays.direction_x[lane] = heading.x * direction.x - heading.y * direction.y;
-            rays.direction_y[lane] = heading.y * direction.x + heading.x * direction.y;
-        }
-        rays
+        self.effects
+            .iter()
+            .map(|active| active.effect.ray_factor(&active.values, &hit))
+            .product()
     }
 
     /// The physics steps of one control step.
@@ -306,12 +315,17 @@ impl<'w> Run<'w> {
         const MOST_PUSHES: usize = 32;
         let radius_m = self.machine.robot.body_radius_m;
         for push in 0..MOST_PUSHES {
-            let Some(point) = self.geometry.contact.nearest_within(&self.geometry.walls, self.pose.position, radius_m)
+            let Some(point) =
+                self.geometry
+                    .contact
+                    .nearest_within(&self.geometry.walls, self.pose.position, radius_m)
             else {
                 return;
             };
             self.contacts += u64::from(push == 0);
-            let away = (self.pose.position - point).try_normalize().unwrap_or(-self.pose.heading);
+            let away = (self.pose.position - point)
+                .try_normalize()
+                .unwrap_or(-self.pose.heading);
             // A hair more than the radius, so that rounding does not make it overlap again.
             self.pose.position = point + away * (radius_m * (1.0 + 1e-12));
         }
@@ -339,11 +353,14 @@ impl<'w> Run<'w> {
 }
 
 /// The beam of all sensors, ray by ray.
-fn sights(machine: &Machine) -> Vec<Sight> {
-    let axes = machine.mounts.map(|mount| Vec2::new(mount.angle_rad.cos(), mount.angle_rad.sin()));
+pub(crate) fn sights(machine: &Machine) -> Vec<Sight> {
+    let axes = machine
+        .mounts
+        .map(|mount| Vec2::new(mount.angle_rad.cos(), mount.angle_rad.sin()));
     let sight = |&(turn, weight): &(Vec2, f64)| Sight {
-        origin: machine.mounts.map(|mount| mount.position),
-        direction: axes.map(|axis| axis.rotate(turn)),
+        rays: Rays::new(std::array::from_fn(|i| {
+            (machine.mounts[i].position, axes[i].rotate(turn))
+        })),
         weight,
     };
     machine.beam.rays().iter().map(sight).collect()
@@ -393,5 +410,10 @@ pub fn drive(
     };
     // "As the first lap was much influenced by the initial position of the robot, it was always removed."
     let kept = done.split_off(done.len().min(1));
-    Ok(Drive { laps: kept, contacts: run.contacts, timed_out, steps: run.steps })
+    Ok(Drive {
+        laps: kept,
+        contacts: run.contacts,
+        timed_out,
+        steps: run.steps,
+    })
 }

@@ -105,6 +105,13 @@ impl Walls {
         (0..self.pieces.len()).filter(|&i| self.pieces[i].is_some()).map(|i| (i, self.vertex(i), self.vertex(i + 1)))
     }
 
+    /// The numbers of the vertices of each outline, the repeated one included.
+    pub(crate) fn outlines(&self) -> impl Iterator<Item = std::ops::Range<usize>> + '_ {
+        let ends = (0..self.pieces.len()).filter(|&i| self.pieces[i].is_none()).map(|i| i + 1);
+        let mut start = 0;
+        ends.map(move |end| std::mem::replace(&mut start, end)..end)
+    }
+
     /// Vertex `i`, m.
     #[inline]
     pub fn vertex(&self, i: usize) -> Vec2 {

@@ -38,10 +38,18 @@ pub(crate) struct Geometry {
 
 impl Geometry {
     fn new(walls: Walls, kind: Option<CasterKind>, machine: &Machine) -> Self {
-        let spread_m = machine.mounts.iter().map(|mount| mount.position.length()).fold(0.0, f64::max);
+        let spread_m = machine
+            .mounts
+            .iter()
+            .map(|mount| mount.position.length())
+            .fold(0.0, f64::max);
         let caster = Caster::new(kind, &walls, machine.range_m, spread_m + 1e-9);
         let contact = Cells::new(&walls, machine.robot.body_radius_m);
-        Self { walls, caster, contact }
+        Self {
+            walls,
+            caster,
+            contact,
+        }
     }
 }
 
@@ -67,9 +75,15 @@ impl Scene {
         model.check()?;
         let corridor = circuit.course.corridor_m();
         let body_m = 2.0 * model.machine.robot.body_radius_m;
-        if corridor.narrowest_m - model.wall.thickness_m <= body_m {
+        let narrowest_m = corridor.narrowest_m - model.wall.thickness_m;
+        if narrowest_m <= body_m {
             let at = corridor.narrowest_at;
-            return Err(Error::TooNarrow { narrowest_m: corridor.narrowest_m, x_m: at.x, y_m: at.y, body_m });
+            return Err(Error::TooNarrow {
+                narrowest_m,
+                x_m: at.x,
+                y_m: at.y,
+                body_m,
+            });
         }
         let outer = circuit.course.outer.flatten(model.wall.max_error_m)?;
         let inner = circuit.course.inner.flatten(model.wall.max_error_m)?;
@@ -77,7 +91,16 @@ impl Scene {
         let declared = Arc::new(Geometry::new(walls, caster, &model.machine));
         let Machine { range_m, robot, .. } = &model.machine;
         let (range_m, body_radius_m) = (*range_m, robot.body_radius_m);
-        Ok(Self { circuit, rules: model.wall, kind: caster, outer, inner, range_m, body_radius_m, declared })
+        Ok(Self {
+            circuit,
+            rules: model.wall,
+            kind: caster,
+            outer,
+            inner,
+            range_m,
+            body_radius_m,
+            declared,
+        })
     }
 
     /// The course and its gates.
@@ -110,7 +133,13 @@ impl Scene {
         let effects = Active::all(&model.effects, run)?;
         let machine = altered(&model.machine, &effects);
         let geometry = self.geometry(&effects, &machine);
-        Ok(World { scene: self, model: model.clone(), run, machine, geometry })
+        Ok(World {
+            scene: self,
+            model: model.clone(),
+            run,
+            machine,
+            geometry,
+        })
     }
 
     /// The walls as the effects move them.
@@ -120,8 +149,15 @@ impl Scene {
         if outer.is_none() && inner.is_none() && machine.range_m <= self.range_m {
             return Arc::clone(&self.declared);
         }
-        let (outer, inner) = (outer.as_ref().unwrap_or(&self.outer), inner.as_ref().unwrap_or(&self.inner));
-        Arc::new(Geometry::new(Walls::new(outer, inner, self.rules.thickness_m), self.kind, machine))
+        let (outer, inner) = (
+            outer.as_ref().unwrap_or(&self.outer),
+            inner.as_ref().unwrap_or(&self.inner),
+        );
+        Arc::new(Geometry::new(
+            Walls::new(outer, inner, self.rules.thickness_m),
+            self.kind,
+            machine,
+        ))
     }
 
     /// What there is to know of a place on a wall.
@@ -138,16 +174,30 @@ impl Scene {
     /// One wall's chain with its vertices moved, or `None` where nothing moves it.
     fn moved(&self, side: Side, effects: &[Active]) -> Option<Chain> {
         let wall = self.circuit.course.wall(side);
-        let site = |vertex: &Vertex| self.site(WallPlace { side, fraction: vertex.fraction });
+        let site = |vertex: &Vertex| {
+            self.site(WallPlace {
+                side,
+                fraction: vertex.fraction,
+            })
+        };
         let displacement_m = |vertex: &Vertex| -> f64 {
             let at = site(vertex);
-            effects.iter().map(|active| active.effect.displacement_m(&active.values, &at)).sum()
+            effects
+                .iter()
+                .map(|active| active.effect.displacement_m(&active.values, &at))
+                .sum()
         };
         let divides = |a: &Vertex, b: &Vertex| {
             let (from, to) = (site(a), site(b));
-            effects.iter().any(|active| active.effect.divides(&active.values, &from, &to))
+            effects
+                .iter()
+                .any(|active| active.effect.divides(&active.values, &from, &to))
         };
-        let chain = if side == Side::Outer { &self.outer } else { &self.inner };
+        let chain = if side == Side::Outer {
+            &self.outer
+        } else {
+            &self.inner
+        };
         let mut vertices = Vec::with_capacity(chain.vertices.len());
         for (a, b) in chain.segments() {
             vertices.push(*a);
@@ -157,7 +207,11 @@ impl Scene {
                     let share = f64::from(i) / f64::from(PARTS);
                     let fraction = (a.fraction + share * span).rem_euclid(1.0);
                     let position = a.position.lerp(b.position, share);
-                    Vertex { position, left_normal: wall.left_normal(fraction), fraction }
+                    Vertex {
+                        position,
+                        left_normal: wall.left_normal(fraction),
+                        fraction,
+                    }
                 }));
             }
         }
@@ -201,6 +255,11 @@ impl World<'_> {
         self.scene.circuit()
     }
 
+    /// Which run of the data set this is, from 0.
+    pub fn run(&self) -> usize {
+        self.run
+    }
+
     /// How runs begin, tick and end.
     pub fn rules(&self) -> &RunRules {
         &self.model.run
@@ -230,6 +289,10 @@ impl World<'_> {
     /// Unit vector in which this run crosses a gate.
     pub(crate) fn forward(&self, gate: usize) -> Vec2 {
         let forward = self.circuit().gates[gate].forward();
-        if self.model.run.way == Way::Forward { forward } else { -forward }
+        if self.model.run.way == Way::Forward {
+            forward
+        } else {
+            -forward
+        }
     }
 }

@@ -40,7 +40,11 @@ fn read(args: &FitSensor) -> Result<(Vec<[f64; 2]>, [String; 2], Input)> {
     let names = columns.map(|i| file.header[i].clone());
     let mut pairs = Vec::new();
     while let Some(row) = file.next_row()? {
-        pairs.push([row.required(columns[0])?, row.required(columns[1])?]);
+        let pair = [row.required(columns[0])?, row.required(columns[1])?];
+        if pair[0] < 0.0 {
+            return Err(row.field_error(columns[0], format!("{} m is no distance; it must not be negative", pair[0])));
+        }
+        pairs.push(pair);
     }
     Ok((pairs, names, file.input))
 }

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use anyhow::Result;
+use anyhow::{Context, Result};
 use chart::{Axis, Color, Dash, Figure, Mark, Panel, Shape, Style};
 use serde_json::{Value, json};
 use track::{Course, Side};
@@ -36,7 +36,8 @@ fn check(session: &Session, source: &WorldSource, json: bool, out: Option<&Path>
     let config = Config::shipped();
     let circuit = setup::circuit(source, config.run.gates)?;
     let model = setup::model(&config, &circuit)?;
-    sim::Scene::new(std::sync::Arc::clone(&circuit), &model, None)?; // the robot fits
+    let scene = sim::Scene::new(std::sync::Arc::clone(&circuit), &model, None);
+    scene.with_context(|| source.label.clone())?; // the robot fits
     let course = &circuit.course;
     let corridor = course.corridor_m();
     if let Some(out) = out {
@@ -119,7 +120,8 @@ fn segments(
 
 fn approximation(course: &Course, max_error_m: f64) -> Result<Value> {
     let chain = |side: Side| course.wall(side).flatten(max_error_m).map(|chain| (course.wall(side), chain));
-    let (outer, inner) = (chain(Side::Outer)?, chain(Side::Inner)?);
+    let both = chain(Side::Outer).and_then(|outer| Ok((outer, chain(Side::Inner)?)));
+    let (outer, inner) = both.with_context(|| format!("--max-error {max_error_m}"))?;
     let measured = |(wall, chain): &(&track::Wall, track::Chain)| chain.measured_error_m(wall);
     let (n_outer, n_inner) = (outer.1.vertices.len(), inner.1.vertices.len());
     Ok(json!({

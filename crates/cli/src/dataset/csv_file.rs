@@ -38,15 +38,21 @@ impl CsvFile {
     /// # Errors
     /// It cannot be read, is not what its `.gz` promises, is empty, or repeats a column.
     pub(crate) fn open(path: &Path) -> Result<Self> {
+        Self::new(path, &read(path)?)
+    }
+
+    /// The file of these bytes with its header read; `path` is what messages call it.
+    ///
+    /// # Errors
+    /// It is not what its `.gz` promises, is empty, or repeats a column.
+    pub(crate) fn new(path: &Path, bytes: &[u8]) -> Result<Self> {
         let label = path.display().to_string();
-        let bytes = read(path)?;
-        let input = Input::of(label.clone(), &bytes);
+        let input = Input::of(label.clone(), bytes);
         let text: Arc<[u8]> = if path.extension().is_some_and(|ending| ending == "gz") {
-            unpacked(&bytes).with_context(|| format!("{label} cannot be unpacked as gzip"))?
+            unpacked(bytes).with_context(|| format!("{label} cannot be unpacked as gzip"))?.into()
         } else {
-            bytes
-        }
-        .into();
+            bytes.into()
+        };
         let mut reader = csv::ReaderBuilder::new()
             .flexible(true)
             .has_headers(false)
@@ -96,7 +102,8 @@ impl CsvFile {
         };
         let (fields, columns) = (row.record.len(), row.header.len());
         if fields != columns {
-            return Err(row.error(format!("{fields} fields under a header of {columns}")));
+            let mend = "give every row as many, empty where a value is missing";
+            return Err(row.error(format!("{fields} fields under a header of {columns}; {mend}")));
         }
         Ok(Some(row))
     }
@@ -118,18 +125,8 @@ impl Row<'_> {
     /// # Errors
     /// Anything else, with file, line and column.
     pub(crate) fn number(&self, column: usize) -> Result<Option<f64>> {
-        let field = self.record.get(column).unwrap_or_default().trim_ascii();
-        if field.is_empty() {
-            return Ok(None);
-        }
-        let text = std::str::from_utf8(field).unwrap_or_default();
-        match text.parse::<f64>() {
-            Ok(number) if number.is_finite() => Ok(Some(number)),
-            _ => Err(self.field_error(column, {
-                let field = String::from_utf8_lossy(field);
-                format!("`{field}` is not a finite number; leave the field empty if it is missing")
-            })),
-        }
+        let mend = "leave the field empty if it is missing";
+        self.parsed(column).map_err(|field| self.not_finite(column, &field, mend))
     }
 
     /// The number in a column that may not be empty.
@@ -137,8 +134,26 @@ impl Row<'_> {
     /// # Errors
     /// An empty field or anything but a finite number, with file, line and column.
     pub(crate) fn required(&self, column: usize) -> Result<f64> {
-        self.number(column)?
+        self.parsed(column)
+            .map_err(|field| self.not_finite(column, &field, "one is needed here"))?
             .ok_or_else(|| self.field_error(column, "is empty; a number is needed here"))
+    }
+
+    /// The finite number in a column, `None` for an empty field, or the field that is no such number.
+    fn parsed(&self, column: usize) -> Result<Option<f64>, String> {
+        let field = self.record.get(column).unwrap_or_default().trim_ascii();
+        if field.is_empty() {
+            return Ok(None);
+        }
+        let text = std::str::from_utf8(field).unwrap_or_default();
+        match text.parse::<f64>() {
+            Ok(number) if number.is_finite() => Ok(Some(number)),
+            _ => Err(String::from_utf8_lossy(field).into_owned()),
+        }
+    }
+
+    fn not_finite(&self, column: usize, field: &str, mend: &str) -> anyhow::Error {
+        self.field_error(column, format!("`{field}` is not a finite number; {mend}"))
     }
 
     /// The message with file, line and column.

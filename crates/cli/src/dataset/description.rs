@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use anyhow::{Result, anyhow};
 use toml::{Table, Value};
 
-use super::{DESCRIPTION, DataSet, LAPS};
-use crate::config::{Config, ControllerKind, Document, nearest, read};
+use super::{DESCRIPTION, DataSet, LAPS, Source};
+use crate::config::{Config, ControllerKind, Document, nearest};
 use crate::output::Input;
 
 /// Of a data set of laps.
@@ -30,23 +30,23 @@ pub(crate) enum Kind {
     DriveLog,
 }
 
-/// The data set of a folder without its runs, and their names and files.
+/// The data set without its runs, and their names and files.
 ///
 /// # Errors
 /// File, line, what is wrong and how to mend it.
-pub(super) fn load(folder: &Path) -> Result<(DataSet, Vec<(String, PathBuf)>)> {
-    let path = folder.join(DESCRIPTION);
-    let bytes = read(&path)?;
+pub(super) fn load(source: Source<'_>) -> Result<(DataSet, Vec<(String, PathBuf)>)> {
+    let path = source.folder().join(DESCRIPTION);
+    let bytes = source.read(&path)?;
     let label = path.display().to_string();
     let input = Input::of(label.clone(), &bytes);
-    let description = Description(Document::parse(label, bytes)?);
+    let description = Description(Document::parse(label, bytes.into_owned())?);
     if description.kind()? == Kind::DriveLog {
         return Err(description.error("kind", "drive logs cannot be read here yet"));
     }
     description.refuse_unknown_keys()?;
     let set = DataSet {
         name: description.required_text("name")?,
-        folder: folder.to_owned(),
+        folder: source.folder(),
         kind: Kind::Laps,
         world: Some(description.required_text("world")?),
         controller: Some(description.controller()?),
@@ -56,7 +56,7 @@ pub(super) fn load(folder: &Path) -> Result<(DataSet, Vec<(String, PathBuf)>)> {
         runs: Vec::new(),
         inputs: vec![input],
     };
-    Ok((set, description.runs(folder)?))
+    Ok((set, description.runs(source)?))
 }
 
 /// The data set of a folder that has no `dataset.toml`.
@@ -155,7 +155,7 @@ impl Description {
         }
     }
 
-    fn runs(&self, folder: &Path) -> Result<Vec<(String, PathBuf)>> {
+    fn runs(&self, source: Source<'_>) -> Result<Vec<(String, PathBuf)>> {
         let needed = "the names of the runs are needed, as runs = [\"a\", \"b\"]";
         let names = match self.get("runs") {
             None => return Err(anyhow!("{}: `runs` is missing; {needed}", self.0.label)),
@@ -171,7 +171,7 @@ impl Description {
             if runs.iter().any(|(other, _)| other == name) {
                 return Err(fault(format!("run `{name}` is named twice; remove one")));
             }
-            let path = run_path(folder, name).map_err(fault)?;
+            let path = run_path(source, name).map_err(fault)?;
             runs.push((name.to_owned(), path));
         }
         Ok(runs)
@@ -183,10 +183,10 @@ fn is_plain(name: &str) -> bool {
     !name.is_empty() && !name.contains(['/', '\\', '\0'])
 }
 
-fn run_path(folder: &Path, name: &str) -> Result<PathBuf, String> {
-    let plain = folder.join(format!("run_{name}.csv"));
-    let packed = folder.join(format!("run_{name}.csv.gz"));
-    match (plain.is_file(), packed.is_file()) {
+fn run_path(source: Source<'_>, name: &str) -> Result<PathBuf, String> {
+    let names = [format!("run_{name}.csv"), format!("run_{name}.csv.gz")];
+    let [plain, packed] = names.each_ref().map(|file| source.folder().join(file));
+    match names.map(|file| source.holds(&file)).into() {
         (true, false) => Ok(plain),
         (false, true) => Ok(packed),
         (true, true) => Err(format!(

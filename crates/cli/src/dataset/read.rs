@@ -34,8 +34,8 @@ struct Columns {
 ///
 /// # Errors
 /// A required column is missing, a field is not a number, times do not rise, no rows.
-pub(super) fn run(path: &Path) -> Result<(Rows, Input)> {
-    let mut file = CsvFile::open(path)?;
+pub(super) fn run(path: &Path, bytes: &[u8]) -> Result<(Rows, Input)> {
+    let mut file = CsvFile::new(path, bytes)?;
     let columns = Columns::find(&file)?;
     let mut rows = Rows {
         log: columns.log.map(|_| Log::default()),

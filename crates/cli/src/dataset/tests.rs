@@ -125,7 +125,7 @@ fn faults_of_a_run_name_line_and_column() {
         ),
         (
             "t_s,x_m,y_m\n0,1,2\n1,2\n",
-            "run_a.csv:3: 2 fields under a header of 3",
+            "run_a.csv:3: 2 fields under a header of 3; give every row as many, empty where a value is missing",
         ),
         (
             "t_s,x_m,y_m\n\n\n0,1,two\n",
@@ -362,5 +362,17 @@ proptest! {
         let folder = folder(&dataset, &run);
         let _ = DataSet::load(folder.path());
         let _ = load_run_csv(&folder.path().join("run_a.csv"));
+    }
+}
+
+#[test]
+fn the_shipped_laps_are_there_without_a_folder() {
+    for controller in [ControllerKind::RuleBased, ControllerKind::Braitenberg] {
+        let set = DataSet::shipped(controller).unwrap();
+        assert_eq!(set.controller, Some(controller));
+        let runs: Vec<_> = set.runs.iter().map(|run| run.name.as_str()).collect();
+        assert_eq!((runs, set.laps, set.inputs.len()), (vec!["a", "b", "c", "d"], 20, 5));
+        assert!(set.runs.iter().all(|run| run.rows.t_s.len() > 20_000));
+        assert_eq!(set.world_source(None).unwrap().path, None);
     }
 }

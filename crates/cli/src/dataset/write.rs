@@ -10,6 +10,7 @@ use toml::Table;
 use super::read::LOG_COLUMNS;
 use super::{DESCRIPTION, Rows};
 use crate::config::ControllerKind;
+use crate::output::unwritable;
 
 const T_DECIMALS: usize = 3;
 const POSITION_DECIMALS: usize = 4;
@@ -36,7 +37,7 @@ pub(crate) struct DataSetToWrite<'a> {
 pub(crate) fn write_dataset(dir: &Path, set: &DataSetToWrite<'_>) -> Result<()> {
     let write = |name: &str, bytes: &[u8]| {
         let path = dir.join(name);
-        fs::write(&path, bytes).with_context(|| format!("cannot write {}", path.display()))
+        fs::write(&path, bytes).map_err(|error| unwritable(&path, &error))
     };
     write(DESCRIPTION, dataset_toml(set).as_bytes())?;
     set.runs.iter().try_for_each(|(name, rows)| {

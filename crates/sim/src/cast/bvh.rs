@@ -1,7 +1,7 @@
 //! parry2d's bounding volume hierarchy, for comparison.
 
-use parry2d::query::{Ray, RayCast};
-use parry2d::shape::{FeatureId, Polyline};
+use parry2d::query::Ray;
+use parry2d::shape::{CompositeShapeRef, Polyline};
 use track::Vec2;
 
 use super::{Hits, LANES, Rays};
@@ -25,14 +25,15 @@ impl Bvh {
 
     pub(super) fn cast(&self, rays: &Rays, range_m: f64) -> Hits {
         let mut hits = Hits::NONE;
+        // It leaves out walls at exactly the range, which the caller wants; those beyond, the caller leaves out.
+        let beyond_m = range_m * (1.0 + 1e-12);
         for i in 0..LANES {
             let ray = Ray::new(rays.origin(i), rays.direction(i));
-            if let Some(hit) = self.polyline.cast_local_ray_and_get_normal(&ray, range_m, false) {
-                hits.distance_m[i] = hit.time_of_impact;
-                if let FeatureId::Face(face) = hit.feature {
-                    // A polyline counts its back faces after its front faces.
-                    hits.segment[i] = self.numbers[face as usize % self.numbers.len()];
-                }
+            if let Some((segment, distance_m)) =
+                CompositeShapeRef(&self.polyline).cast_local_ray(&ray, beyond_m, false)
+            {
+                hits.distance_m[i] = distance_m;
+                hits.segment[i] = self.numbers[segment as usize];
             }
         }
         hits

@@ -2,7 +2,7 @@
 
 use track::Vec2;
 
-use super::cells::Grid;
+use super::grid::Grid;
 use super::{Hits, LANES, Rays, crossing, sight};
 use crate::Walls;
 

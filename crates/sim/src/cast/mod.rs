@@ -3,14 +3,20 @@
 //! All casters of ours use one intersection ([`crossing`]) and therefore agree bit for bit.
 
 mod bvh;
+#[cfg(test)]
+mod cases;
 mod cells;
+mod grid;
 mod march;
+#[cfg(test)]
+mod tests;
+mod tree;
 
 use track::Vec2;
 
 pub(crate) use cells::Cells;
 
-use crate::Walls;
+use crate::{Pose, Walls};
 
 /// Rays that are cast together: one for each sensor.
 pub const LANES: usize = 8;
@@ -37,6 +43,22 @@ impl Rays {
             direction_x: rays.map(|(_, direction)| direction.x),
             direction_y: rays.map(|(_, direction)| direction.y),
         }
+    }
+
+    /// Rays of the body frame in the world of a robot at that pose.
+    #[inline(always)]
+    pub fn placed(&self, pose: Pose) -> Self {
+        let Pose { position, heading } = pose;
+        let mut placed = *self;
+        for i in 0..LANES {
+            let (x, y) = (self.origin_x[i], self.origin_y[i]);
+            placed.origin_x[i] = position.x + (heading.x * x - heading.y * y);
+            placed.origin_y[i] = position.y + (heading.y * x + heading.x * y);
+            let (x, y) = (self.direction_x[i], self.direction_y[i]);
+            placed.direction_x[i] = heading.x * x - heading.y * y;
+            placed.direction_y[i] = heading.y * x + heading.x * y;
+        }
+        placed
     }
 
     /// Origin of ray `i`, m.
@@ -76,8 +98,9 @@ fn sight(origin: (f64, f64), direction: (f64, f64), vertex: (f64, f64)) -> (f64,
 /// Distance along a ray to the segment between two vertices seen at `(side, advance)`, or infinity.
 ///
 /// The ray crosses the segment's line where the side changes sign; the distance is interpolated between the two
-/// advances. A vertex exactly on the ray counts as on its left. A segment that lies along the ray is not hit itself:
-/// the ray sees the chain at the joint with the next segment that does not.
+/// advances. A vertex exactly on the ray counts as on its left, as if the ray were shifted to the right by less than
+/// any number: a chain that only touches the ray from the left is not hit, and neither is a segment that lies along
+/// it, but the joint where the chain goes on to the right.
 #[inline(always)]
 fn crossing(from: (f64, f64), to: (f64, f64)) -> f64 {
     let distance = from.1 + (to.1 - from.1) * (from.0 / (from.0 - to.0));
@@ -106,24 +129,28 @@ pub enum CasterKind {
     Bvh,
     /// For each cell of a coarse grid the runs of segments in the robot's reach, against eight rays at once.
     Cells,
+    /// For each cell of a coarse grid the stretches of wall in the robot's reach, and below each a tree of eights.
+    Tree,
     /// Each ray marches through a fine grid that knows how far the nearest wall is.
     March,
 }
 
 impl CasterKind {
     /// All kinds with the names a user gives them.
-    pub const NAMED: [(&'static str, Self); 4] =
-        [("brute", Self::Brute), ("bvh", Self::Bvh), ("cells", Self::Cells), ("march", Self::March)];
+    pub const NAMED: [(&'static str, Self); 5] = [
+        ("brute", Self::Brute),
+        ("bvh", Self::Bvh),
+        ("cells", Self::Cells),
+        ("tree", Self::Tree),
+        ("march", Self::March),
+    ];
 
-    /// The quicker of our casters for this many segments within the reach of an average place.
-    fn for_walls(walls: &Walls) -> Self {
-        // Measured by benches/ray_cast.rs: the lanes win while a disc of the rays' reach holds few segments.
-        if walls.len() <= 600 { Self::Cells } else { Self::March }
-    }
-
-    /// The kind of that name.
-    pub fn from_name(name: &str) -> Option<Self> {
-        Self::NAMED.iter().find(|(known, _)| *known == name).map(|(_, kind)| *kind)
+    /// The quicker of our casters for these walls: by benches/ray_cast.rs the tree wins as soon as segments are on
+    /// average shorter than a sixth of the range.
+    fn for_walls(walls: &Walls, range_m: f64) -> Self {
+        const LONG_SEGMENT: f64 = 0.16;
+        let length_m: f64 = walls.segments().map(|(_, a, b)| a.distance(b)).sum();
+        if length_m < LONG_SEGMENT * range_m * walls.len() as f64 { Self::Tree } else { Self::Cells }
     }
 
     /// The name a user gives this kind.
@@ -144,6 +171,7 @@ enum Method {
     Brute,
     Bvh(Box<bvh::Bvh>),
     Cells(Cells),
+    Tree(tree::Tree),
     March(march::March),
 }
 
@@ -151,11 +179,12 @@ impl Caster {
     /// Prepares the walls for rays of at most `range_m` that start within `spread_m` of the robot's centre; `None`
     /// chooses the kind by the walls.
     pub fn new(kind: Option<CasterKind>, walls: &Walls, range_m: f64, spread_m: f64) -> Self {
-        let kind = kind.unwrap_or_else(|| CasterKind::for_walls(walls));
+        let kind = kind.unwrap_or_else(|| CasterKind::for_walls(walls, range_m));
         let method = match kind {
             CasterKind::Brute => Method::Brute,
             CasterKind::Bvh => Method::Bvh(Box::new(bvh::Bvh::new(walls))),
             CasterKind::Cells => Method::Cells(Cells::new(walls, range_m + spread_m)),
+            CasterKind::Tree => Method::Tree(tree::Tree::new(walls, range_m + spread_m)),
             CasterKind::March => Method::March(march::March::new(walls, range_m)),
         };
         Self { method, range_m }
@@ -167,6 +196,7 @@ impl Caster {
             Method::Brute => CasterKind::Brute,
             Method::Bvh(_) => CasterKind::Bvh,
             Method::Cells(_) => CasterKind::Cells,
+            Method::Tree(_) => CasterKind::Tree,
             Method::March(_) => CasterKind::March,
         }
     }
@@ -178,6 +208,7 @@ impl Caster {
             Method::Brute => brute(walls, rays),
             Method::Bvh(bvh) => bvh.cast(rays, self.range_m),
             Method::Cells(cells) => cells.cast(walls, center, rays),
+            Method::Tree(tree) => tree.cast(center, rays, self.range_m),
             Method::March(march) => march.cast(walls, rays, self.range_m),
         };
         for distance in &mut hits.distance_m {

@@ -43,7 +43,11 @@ pub(super) const DEAD_BAND: Spec = Spec {
     summary: "commands slower than this do not move the wheel",
     params: &[Param::new("speed_m_s", "m/s", 0.0, 0.0, 0.2)],
     list: None,
-    build: || Box::new(OnDrive(|values, speed| if speed.abs() < values[0] { 0.0 } else { speed })),
+    build: || {
+        Box::new(OnDrive(
+            |values, speed| if speed.abs() < values[0] { 0.0 } else { speed },
+        ))
+    },
 };
 
 /// Commands rounded to multiples, as those of a stepper's driver are.
@@ -73,7 +77,9 @@ struct MotorLag(WheelSpeeds);
 impl Effect for MotorLag {
     fn drive(&mut self, values: &[f64], now: &Moment, wheels: WheelSpeeds) -> WheelSpeeds {
         let decay = decay(now.step_s, values[0]);
-        self.0 = both(wheels, self.0, |target, before| target + decay * (before - target));
+        self.0 = both(wheels, self.0, |target, before| {
+            target + decay * (before - target)
+        });
         self.0
     }
 }
@@ -95,14 +101,19 @@ struct AccelerationLimit(WheelSpeeds);
 impl Effect for AccelerationLimit {
     fn drive(&mut self, values: &[f64], now: &Moment, wheels: WheelSpeeds) -> WheelSpeeds {
         let most = values[0] * now.step_s;
-        self.0 = both(wheels, self.0, |target, before| target.clamp(before - most, before + most));
+        self.0 = both(wheels, self.0, |target, before| {
+            target.clamp(before - most, before + most)
+        });
         self.0
     }
 }
 
 /// Each wheel's speed in both through the same function.
 fn both(a: WheelSpeeds, b: WheelSpeeds, f: impl Fn(f64, f64) -> f64) -> WheelSpeeds {
-    WheelSpeeds { left_m_s: f(a.left_m_s, b.left_m_s), right_m_s: f(a.right_m_s, b.right_m_s) }
+    WheelSpeeds {
+        left_m_s: f(a.left_m_s, b.left_m_s),
+        right_m_s: f(a.right_m_s, b.right_m_s),
+    }
 }
 
 /// The declared slip times a factor.
@@ -163,7 +174,11 @@ pub(super) const WHEEL_SCALE: Spec = Spec {
     summary: "both wheels' speed times factor",
     params: &[Param::new("factor", "", 1.0, 0.1, 5.0)],
     list: None,
-    build: || Box::new(OnGround(|values, _, wheels| wheels.map(|speed| speed * values[0]))),
+    build: || {
+        Box::new(OnGround(|values, _, wheels| {
+            wheels.map(|speed| speed * values[0])
+        }))
+    },
 };
 
 /// A battery that runs down: wheel speeds times 1 - per_s t, which ends at rest.
@@ -221,8 +236,17 @@ pub(super) const FLOOR_TILT: Spec = Spec {
     summary: "a constant velocity added to the robot's",
     params: &[
         Param::new("speed_m_s", "m/s", 0.0, 0.0, 0.1),
-        Param::place("azimuth_rad", "rad", -std::f64::consts::TAU, std::f64::consts::TAU),
+        Param::place(
+            "azimuth_rad",
+            "rad",
+            -std::f64::consts::TAU,
+            std::f64::consts::TAU,
+        ),
     ],
     list: None,
-    build: || Box::new(OnDrift(|values| Vec2::new(values[1].cos(), values[1].sin()) * values[0])),
+    build: || {
+        Box::new(OnDrift(|values| {
+            Vec2::new(values[1].cos(), values[1].sin()) * values[0]
+        }))
+    },
 };

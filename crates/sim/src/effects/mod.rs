@@ -11,6 +11,11 @@ mod plain;
 mod rays;
 mod sense;
 mod setting;
+#[cfg(test)]
+mod testing;
+#[cfg(test)]
+mod tests;
+mod unlisted;
 mod world;
 
 use std::fmt::Debug;
@@ -19,6 +24,7 @@ use track::Vec2;
 
 pub(crate) use setting::Active;
 pub use setting::{Pattern, Setting};
+pub use unlisted::UNLISTED;
 
 use crate::{Machine, Pose, Readings, Twist, WallPlace, WheelSpeeds};
 
@@ -118,20 +124,25 @@ pub struct Param {
 
 impl Param {
     /// A number with the value at which the effect does nothing.
-    pub const fn new(
-        name: &'static str,
-        unit: &'static str,
-        neutral: f64,
-        low: f64,
-        high: f64,
-    ) -> Self {
+    pub const fn new(name: &'static str, unit: &'static str, neutral: f64, low: f64, high: f64) -> Self {
         let place = Self::place(name, unit, low, high);
-        Self { neutral: Some(neutral), ..place }
+        Self {
+            neutral: Some(neutral),
+            ..place
+        }
     }
 
     /// A number that says where or which, or has no value at which the effect does nothing.
     pub const fn place(name: &'static str, unit: &'static str, low: f64, high: f64) -> Self {
-        Self { name, unit, neutral: None, low, high, choices: &[], whole: false }
+        Self {
+            name,
+            unit,
+            neutral: None,
+            low,
+            high,
+            choices: &[],
+            whole: false,
+        }
     }
 
     /// One of the numbers 0, 1, ..., `count` - 1.
@@ -170,15 +181,27 @@ impl PartialEq for Spec {
     }
 }
 
-/// The effect of that name.
+/// The effect of that name, [`UNLISTED`] included.
 ///
 /// # Errors
 /// [`crate::Error::UnknownEffect`] with the nearest name.
+///
+/// ```
+/// let gain = sim::find("reading-gain")?;
+/// assert_eq!(gain.params[0].neutral, Some(1.0));
+/// let drifting = sim::Pattern::ByTime { start: vec![1.0], per_s: vec![1e-4] };
+/// assert!(sim::Setting { spec: gain, pattern: drifting }.check(0).is_ok());
+/// # Ok::<(), sim::Error>(())
+/// ```
 pub fn find(name: &str) -> Result<&'static Spec, crate::Error> {
-    EFFECTS.iter().find(|spec| spec.name == name).ok_or_else(|| {
+    let mut known = EFFECTS.iter().chain([&UNLISTED]);
+    known.find(|spec| spec.name == name).ok_or_else(|| {
         let likeness = |spec: &&Spec| (1e6 * strsim::jaro_winkler(spec.name, name)) as u64;
         let nearest = EFFECTS.iter().max_by_key(likeness).map_or("", |spec| spec.name);
-        crate::Error::UnknownEffect { name: name.into(), nearest: nearest.into() }
+        crate::Error::UnknownEffect {
+            name: name.into(),
+            nearest: nearest.into(),
+        }
     })
 }
 
@@ -191,7 +214,7 @@ pub struct Moment {
     pub step_s: f64,
     /// The robot's true pose at the beginning of the step.
     pub pose: Pose,
-    /// The command of the present control step.
+    /// The latest command: in the sense and observe stages that of the control step before.
     pub command: WheelSpeeds,
     /// Number of the gate that is next.
     pub gate: usize,
@@ -255,14 +278,7 @@ pub trait Effect: Debug + Send {
         false
     }
     /// Changes the readings before noise.
-    fn readings(
-        &mut self,
-        _values: &[f64],
-        _now: &Moment,
-        _machine: &Machine,
-        _readings: &mut Readings,
-    ) {
-    }
+    fn readings(&mut self, _values: &[f64], _now: &Moment, _machine: &Machine, _readings: &mut Readings) {}
     /// Changes the readings after noise, before they are cut to the scale.
     fn noisy_readings(&mut self, _values: &[f64], _readings: &mut Readings) {}
     /// Changes the speeds that the wheels are driven at, once per physics step.

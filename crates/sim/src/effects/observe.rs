@@ -14,10 +14,20 @@ pub(super) const MARKER_OFFSET: Spec = Spec {
     params: &[
         Param::new("forward_m", "m", 0.0, -0.1, 0.1),
         Param::new("left_m", "m", 0.0, -0.1, 0.1),
-        Param::new("angle_rad", "rad", 0.0, -std::f64::consts::PI, std::f64::consts::PI),
+        Param::new(
+            "angle_rad",
+            "rad",
+            0.0,
+            -std::f64::consts::PI,
+            std::f64::consts::PI,
+        ),
     ],
     list: None,
-    build: || Box::new(OnCamera(|values, now, _| now.pose.rotate(Vec2::new(values[0], values[1])))),
+    build: || {
+        Box::new(OnCamera(|values, now, _| {
+            now.pose.rotate(Vec2::new(values[0], values[1]))
+        }))
+    },
 };
 
 /// The square of the radius at which a lens distorts by `k1`, m^2: about that of the arena's corners.
@@ -46,7 +56,9 @@ pub(super) const CAMERA_SCALE: Spec = Spec {
     params: &[Param::new("factor", "", 1.0, 0.5, 2.0)],
     list: None,
     build: || {
-        Box::new(OnCamera(|values, now, position| (position - now.arena_middle) * (values[0] - 1.0)))
+        Box::new(OnCamera(|values, now, position| {
+            (position - now.arena_middle) * (values[0] - 1.0)
+        }))
     },
 };
 
@@ -71,7 +83,10 @@ pub(super) const CAMERA_OFFSET: Spec = Spec {
     name: "camera-offset",
     stage: Stage::Observe,
     summary: "positions moved by a constant",
-    params: &[Param::new("dx_m", "m", 0.0, -0.5, 0.5), Param::new("dy_m", "m", 0.0, -0.5, 0.5)],
+    params: &[
+        Param::new("dx_m", "m", 0.0, -0.5, 0.5),
+        Param::new("dy_m", "m", 0.0, -0.5, 0.5),
+    ],
     list: None,
     build: || Box::new(OnCamera(|values, _, _| Vec2::new(values[0], values[1]))),
 };

@@ -20,13 +20,7 @@ impl Effect for OnMachine {
 pub(super) struct OnReadings(pub(super) fn(&[f64], &Moment, &mut Readings));
 
 impl Effect for OnReadings {
-    fn readings(
-        &mut self,
-        values: &[f64],
-        now: &Moment,
-        _machine: &Machine,
-        readings: &mut Readings,
-    ) {
+    fn readings(&mut self, values: &[f64], now: &Moment, _machine: &Machine, readings: &mut Readings) {
         (self.0)(values, now, readings);
     }
 }

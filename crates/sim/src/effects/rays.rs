@@ -99,7 +99,13 @@ pub(super) const OUTER_WALL_REFLECTANCE: Spec = Spec {
     params: &[Param::new("factor", "", 1.0, 0.0, 10.0)],
     list: None,
     build: || {
-        Box::new(OnRays(|values, hit| if hit.site.place.side == Side::Outer { values[0] } else { 1.0 }))
+        Box::new(OnRays(|values, hit| {
+            if hit.site.place.side == Side::Outer {
+                values[0]
+            } else {
+                1.0
+            }
+        }))
     },
 };
 
@@ -111,7 +117,13 @@ pub(super) const INNER_WALL_REFLECTANCE: Spec = Spec {
     params: &[Param::new("factor", "", 1.0, 0.0, 10.0)],
     list: None,
     build: || {
-        Box::new(OnRays(|values, hit| if hit.site.place.side == Side::Inner { values[0] } else { 1.0 }))
+        Box::new(OnRays(|values, hit| {
+            if hit.site.place.side == Side::Inner {
+                values[0]
+            } else {
+                1.0
+            }
+        }))
     },
 };
 

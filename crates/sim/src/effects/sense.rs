@@ -28,7 +28,11 @@ pub(super) const ONE_SENSOR_GAIN: Spec = Spec {
     summary: "the reading of one of S0 to S7 times gain, before noise",
     params: &[SENSOR, Param::new("gain", "", 1.0, 0.0, 20.0)],
     list: None,
-    build: || Box::new(OnReadings(|values, _, readings| readings[values[0] as usize] *= values[1])),
+    build: || {
+        Box::new(OnReadings(|values, _, readings| {
+            readings[values[0] as usize] *= values[1]
+        }))
+    },
 };
 
 /// Every reading times 1 + per_s t, before noise.
@@ -67,7 +71,11 @@ pub(super) const ONE_SENSOR_OFFSET: Spec = Spec {
     summary: "counts added to the reading of one of S0 to S7, before noise",
     params: &[SENSOR, Param::new("counts", "counts", 0.0, -4000.0, 4000.0)],
     list: None,
-    build: || Box::new(OnReadings(|values, _, readings| readings[values[0] as usize] += values[1])),
+    build: || {
+        Box::new(OnReadings(|values, _, readings| {
+            readings[values[0] as usize] += values[1]
+        }))
+    },
 };
 
 /// A lamp or the sun: counts for the sensors that look at it.
@@ -77,7 +85,12 @@ pub(super) const DIRECTIONAL_LIGHT: Spec = Spec {
     summary: "light from far away: adds counts * max(0, cos(ray direction - azimuth)), before noise",
     params: &[
         Param::new("counts", "counts", 0.0, 0.0, 4000.0),
-        Param::place("azimuth_rad", "rad", -std::f64::consts::TAU, std::f64::consts::TAU),
+        Param::place(
+            "azimuth_rad",
+            "rad",
+            -std::f64::consts::TAU,
+            std::f64::consts::TAU,
+        ),
     ],
     list: None,
     build: || Box::new(DirectionalLight),
@@ -140,7 +153,11 @@ impl Effect for SensorLag {
 
 /// What is left of a difference after one step of a first-order lag: exp(-step / time), 0 without a lag.
 pub(super) fn decay(step_s: f64, time_s: f64) -> f64 {
-    if time_s > 0.0 { (-step_s / time_s).exp() } else { 0.0 }
+    if time_s > 0.0 {
+        (-step_s / time_s).exp()
+    } else {
+        0.0
+    }
 }
 
 /// A factor on the standard deviation of the reading's noise.
@@ -173,11 +190,17 @@ struct ReadingStep;
 
 impl Effect for ReadingStep {
     fn noisy_readings(&mut self, values: &[f64], readings: &mut Readings) {
-        readings.iter_mut().for_each(|reading| *reading = rounded(*reading, values[0]));
+        readings
+            .iter_mut()
+            .for_each(|reading| *reading = rounded(*reading, values[0]));
     }
 }
 
 /// The multiple of `step` that is nearest to a value; the value itself without a step.
 pub(super) fn rounded(value: f64, step: f64) -> f64 {
-    if step > 0.0 { (value / step).round() * step } else { value }
+    if step > 0.0 {
+        (value / step).round() * step
+    } else {
+        value
+    }
 }

@@ -32,7 +32,10 @@ pub struct Setting {
 impl Setting {
     /// An effect with the same values always.
     pub fn constant(spec: &'static Spec, values: impl Into<Vec<f64>>) -> Self {
-        Self { spec, pattern: Pattern::Constant(values.into()) }
+        Self {
+            spec,
+            pattern: Pattern::Constant(values.into()),
+        }
     }
 
     /// The values at the start of a run and their change per second.
@@ -43,10 +46,18 @@ impl Setting {
         match &self.pattern {
             Pattern::Constant(values) => Ok((values, None)),
             Pattern::ByTime { start, per_s } => Ok((start, Some(per_s))),
-            Pattern::ByRun(runs) => runs.get(run).map(|values| (values.as_slice(), None)).ok_or(Error::Invalid {
-                key: format!("effect.{}", self.spec.name),
-                reason: format!("has values for {} runs and is asked for run {}", runs.len(), run + 1),
-            }),
+            Pattern::ByRun(runs) => {
+                runs.get(run)
+                    .map(|values| (values.as_slice(), None))
+                    .ok_or(Error::Invalid {
+                        key: format!("effect.{}", self.spec.name),
+                        reason: format!(
+                            "has values for {} runs and is asked for run {}",
+                            runs.len(),
+                            run + 1
+                        ),
+                    })
+            }
         }
     }
 
@@ -58,9 +69,9 @@ impl Setting {
     pub fn check(&self, index: usize) -> Result<(), Error> {
         match &self.pattern {
             Pattern::Constant(values) => self.check_values(index, values),
-            Pattern::ByRun(runs) => {
-                runs.iter().try_for_each(|values| self.check_values(index, values))
-            }
+            Pattern::ByRun(runs) => runs
+                .iter()
+                .try_for_each(|values| self.check_values(index, values)),
             Pattern::ByTime { start, per_s } => {
                 self.check_values(index, start)?;
                 self.check_count(index, per_s)?;
@@ -96,12 +107,18 @@ impl Setting {
             return Ok(());
         }
         let reason = format!("{} needs {needed} values, not {given}", self.spec.name);
-        Err(Error::Invalid { key: format!("effect.{index}"), reason })
+        Err(Error::Invalid {
+            key: format!("effect.{index}"),
+            reason,
+        })
     }
 
     /// The place of the effect in the signal's way through the robot; an effect outside the registry comes last.
     pub(crate) fn order(&self) -> usize {
-        EFFECTS.iter().position(|spec| spec == self.spec).unwrap_or(EFFECTS.len())
+        EFFECTS
+            .iter()
+            .position(|spec| spec == self.spec)
+            .unwrap_or(EFFECTS.len())
     }
 }
 
@@ -120,7 +137,10 @@ impl Active {
     pub(crate) fn all(settings: &[Setting], run: usize) -> Result<Vec<Self>, Error> {
         let mut ordered: Vec<&Setting> = settings.iter().collect();
         ordered.sort_by_key(|setting| setting.order());
-        ordered.into_iter().map(|setting| Self::new(setting, run)).collect()
+        ordered
+            .into_iter()
+            .map(|setting| Self::new(setting, run))
+            .collect()
     }
 
     fn new(setting: &Setting, run: usize) -> Result<Self, Error> {

@@ -42,7 +42,11 @@ struct WallOffset(Side);
 
 impl Effect for WallOffset {
     fn displacement_m(&self, values: &[f64], at: &Site) -> f64 {
-        if at.place.side == self.0 { at.outward * values[0] } else { 0.0 }
+        if at.place.side == self.0 {
+            at.outward * values[0]
+        } else {
+            0.0
+        }
     }
 }
 
@@ -70,7 +74,11 @@ struct WallBump;
 impl Effect for WallBump {
     fn displacement_m(&self, values: &[f64], at: &Site) -> f64 {
         let [wall, position, height_m, length_m] = [0, 1, 2, 3].map(|i| values[i]);
-        if is_wall(wall, at.place.side) { height_m * gaussian(at.arc_m(position), length_m) } else { 0.0 }
+        if is_wall(wall, at.place.side) {
+            height_m * gaussian(at.arc_m(position), length_m)
+        } else {
+            0.0
+        }
     }
 
     fn divides(&self, values: &[f64], from: &Site, to: &Site) -> bool {

@@ -1,0 +1,182 @@
+//! One or more effects with sizes and patterns, as a vector of numbers that can be fitted.
+
+use sim::{Pattern, Setting};
+
+use super::atlas::Atlas;
+use super::probe::Probe;
+use super::summary::ramp;
+
+/// How an effect goes over the runs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Shape {
+    /// The same always.
+    Constant,
+    /// Another size in each run.
+    ByRun,
+    /// Changing at the same rate in every run.
+    ByTime,
+}
+
+/// One effect of a hypothesis.
+#[derive(Debug, Clone)]
+pub(super) struct Part {
+    pub(super) probe: usize,
+    pub(super) shape: Shape,
+    /// Values of the effect's parameters: one list, or one for each run.
+    pub(super) values: Vec<Vec<f64>>,
+    /// Change of the sized parameter per second, where it changes.
+    pub(super) per_s: f64,
+}
+
+/// Effects that act together.
+#[derive(Debug, Clone)]
+pub(super) struct Hypothesis {
+    pub(super) parts: Vec<Part>,
+}
+
+/// A number of a hypothesis that a fit may change.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Freedom {
+    part: usize,
+    /// All runs, or one.
+    run: Option<usize>,
+    /// The parameter, or `None` for the change per second.
+    parameter: Option<usize>,
+    /// A step over which its action is about linear.
+    pub(super) step: f64,
+}
+
+impl Freedom {
+    /// The run whose size this is, if it is one run's.
+    pub(super) fn run(&self) -> Option<usize> {
+        self.run
+    }
+
+    /// Whether this is the same number of another run.
+    pub(super) fn is_beside(&self, other: &Self) -> bool {
+        self.part == other.part && self.parameter == other.parameter && self.run != other.run
+    }
+}
+
+impl Part {
+    /// A probe at sizes that a screening found: one, one for each run, or one with the change over the ramp of a run's laps.
+    pub(super) fn screened(atlas: &Atlas, probe: usize, shape: Shape, sizes: &[f64]) -> Self {
+        let p = &atlas.probes[probe];
+        let clamped = |size: f64| p.clamped(&p.values(p.quantum.map_or(size, |q| (size / q).round() * q)));
+        match shape {
+            Shape::Constant => Self { probe, shape, values: vec![clamped(sizes[0])], per_s: 0.0 },
+            Shape::ByRun => Self { probe, shape, values: sizes.iter().map(|&s| clamped(s)).collect(), per_s: 0.0 },
+            Shape::ByTime => {
+                let steps = ramp(atlas.laps[0]);
+                let per_lap = sizes[1] * (steps[1] - steps[0]);
+                let per_s = per_lap / atlas.lap_s();
+                // The kept laps begin one and a half laps after the run, on average.
+                let middle_s = (1.5 + atlas.laps[0] as f64 / 2.0) * atlas.lap_s();
+                Self { probe, shape, values: vec![clamped(sizes[0] - per_s * middle_s)], per_s }
+            }
+        }
+    }
+
+    fn setting(&self, probe: &Probe) -> Setting {
+        let pattern = match self.shape {
+            Shape::Constant => Pattern::Constant(self.values[0].clone()),
+            Shape::ByRun => Pattern::ByRun(self.values.clone()),
+            Shape::ByTime => {
+                let mut per_s = vec![0.0; self.values[0].len()];
+                per_s[probe.free[0].0] = self.per_s;
+                Pattern::ByTime { start: self.values[0].clone(), per_s }
+            }
+        };
+        Setting { spec: probe.spec, pattern }
+    }
+
+    /// Standard errors in the order of the pattern's values: run after run, or start values and then slopes.
+    pub(super) fn errors(&self, part: usize, errors: &[(Freedom, f64)], atlas: &Atlas) -> Vec<f64> {
+        let count = self.values[0].len();
+        let slopes = if self.shape == Shape::ByTime { count } else { 0 };
+        let mut all = vec![0.0; count * self.values.len() + slopes];
+        for (freedom, error) in errors.iter().filter(|(f, _)| f.part == part) {
+            match freedom.parameter {
+                None => all[count + atlas.probes[self.probe].free[0].0] = *error,
+                Some(i) => {
+                    let runs = freedom.run.map_or(0..self.values.len(), |run| run..run + 1);
+                    runs.for_each(|run| all[run * count + i] = *error);
+                }
+            }
+        }
+        all
+    }
+
+    fn freedoms(&self, part: usize, atlas: &Atlas) -> Vec<Freedom> {
+        let probe = &atlas.probes[self.probe];
+        let runs = self.values.len();
+        let mut freedoms = Vec::new();
+        for (i, &(parameter, step)) in probe.free.iter().enumerate() {
+            let parameter = Some(parameter);
+            if i == 0 && self.shape == Shape::ByRun {
+                freedoms.extend((0..runs).map(|run| Freedom { part, run: Some(run), parameter, step }));
+            } else {
+                freedoms.push(Freedom { part, run: None, parameter, step });
+            }
+        }
+        if self.shape == Shape::ByTime {
+            let run_s = atlas.laps[0] as f64 * atlas.lap_s();
+            freedoms.push(Freedom { part, run: None, parameter: None, step: probe.free[0].1 / run_s });
+        }
+        freedoms
+    }
+}
+
+impl Hypothesis {
+    /// The effects as the simulator takes them.
+    pub(super) fn settings(&self, atlas: &Atlas) -> Vec<Setting> {
+        self.parts.iter().map(|part| part.setting(&atlas.probes[part.probe])).collect()
+    }
+
+    /// Whether all runs are alike.
+    pub(super) fn alike(&self) -> bool {
+        self.parts.iter().all(|part| part.shape != Shape::ByRun)
+    }
+
+    /// The numbers that a fit may change.
+    pub(super) fn freedoms(&self, atlas: &Atlas) -> Vec<Freedom> {
+        self.parts.iter().enumerate().flat_map(|(i, part)| part.freedoms(i, atlas)).collect()
+    }
+
+    /// The value of one number.
+    pub(super) fn get(&self, freedom: &Freedom) -> f64 {
+        let part = &self.parts[freedom.part];
+        freedom.parameter.map_or(part.per_s, |i| part.values[freedom.run.unwrap_or(0)][i])
+    }
+
+    /// This hypothesis with some numbers moved; each stays in its parameter's range.
+    pub(super) fn moved(&self, atlas: &Atlas, moves: &[(Freedom, f64)]) -> Self {
+        let mut moved = self.clone();
+        for (freedom, by) in moves {
+            let part = &mut moved.parts[freedom.part];
+            let params = atlas.probes[part.probe].spec.params;
+            match freedom.parameter {
+                None => part.per_s += by,
+                Some(i) => {
+                    let runs = freedom.run.map_or(0..part.values.len(), |run| run..run + 1);
+                    for values in &mut part.values[runs] {
+                        values[i] = within(values[i] + by, &params[i]);
+                    }
+                }
+            }
+        }
+        moved
+    }
+}
+
+/// A value brought into its parameter's range: angles and places on a closed wall go round, others stop at the end.
+fn within(value: f64, param: &sim::Param) -> f64 {
+    if param.name == "position" {
+        return value.rem_euclid(1.0);
+    }
+    if param.name == "azimuth_rad" {
+        let pi = std::f64::consts::PI;
+        return (value + pi).rem_euclid(2.0 * pi) - pi;
+    }
+    value.clamp(param.low, param.high)
+}

@@ -1,0 +1,18 @@
+//! Diagnosis from laps that the camera saw.
+
+mod atlas;
+#[allow(missing_docs)]
+pub mod debug;
+mod diagnosis;
+mod expectation;
+mod hypothesis;
+mod pairs;
+mod probe;
+mod refine;
+mod screen;
+mod summary;
+mod tests_of_fit;
+
+pub use atlas::{Atlas, Simulate};
+pub use diagnosis::{Diagnosis, Explanation, Verdict};
+pub use tests_of_fit::{FourNumbers, Quadratic};

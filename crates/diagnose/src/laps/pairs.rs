@@ -1,0 +1,126 @@
+//! Two probes at once, over the paths that were simulated beforehand.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::atlas::{Atlas, White};
+use super::hypothesis::{Hypothesis, Part, Shape};
+use super::screen::price;
+
+/// A straight piece of a probe's path.
+struct Piece {
+    probe: usize,
+    from_size: f64,
+    to_size: f64,
+    /// Shares of the piece that are allowed.
+    low: f64,
+    high: f64,
+    from: White,
+    along: White,
+}
+
+/// Two probes at the sizes that together explain most.
+#[derive(Debug, Clone)]
+pub(super) struct ScreenedPair {
+    pub(super) hypothesis: Hypothesis,
+    pub(super) score: f64,
+}
+
+impl Atlas {
+    /// The pairs of constant probes of different effects that explain a residual best, best first, each pair of probes once.
+    ///
+    /// Their actions are taken to add up. Looking for both at once finds what one after the other does not: the best
+    /// single explanation of two effects is often a third.
+    pub(super) fn screen_pairs(&self, residual: &White, most: usize) -> Vec<ScreenedPair> {
+        let pieces: Vec<Piece> = (0..self.probes.len()).flat_map(|probe| self.pieces(probe)).collect();
+        let along = DMatrix::from_columns(&pieces.iter().map(|p| p.along.clone()).collect::<Vec<_>>());
+        let from = DMatrix::from_columns(&pieces.iter().map(|p| p.from.clone()).collect::<Vec<_>>());
+        let products = Products {
+            along_along: along.tr_mul(&along),
+            along_from: along.tr_mul(&from),
+            from_from: from.tr_mul(&from),
+            along_target: along.tr_mul(residual),
+            from_target: from.tr_mul(residual),
+        };
+        let mut best: std::collections::BTreeMap<(usize, usize), (f64, [f64; 2])> = std::collections::BTreeMap::new();
+        for (i, a) in pieces.iter().enumerate() {
+            for (j, b) in pieces.iter().enumerate().skip(i + 1) {
+                if self.probes[a.probe].spec == self.probes[b.probe].spec {
+                    continue;
+                }
+                let (gain, shares) = products.best([i, j], [a, b]);
+                let sizes = [(a, shares[0]), (b, shares[1])].map(|(p, share)| p.from_size + share * (p.to_size - p.from_size));
+                let entry = best.entry((a.probe, b.probe)).or_insert((f64::NEG_INFINITY, sizes));
+                if gain > entry.0 {
+                    *entry = (gain, sizes);
+                }
+            }
+        }
+        let laps = self.laps.iter().sum();
+        let mut pairs: Vec<ScreenedPair> = best
+            .into_iter()
+            .map(|((a, b), (gain, sizes))| {
+                let fitted = self.probes[a].free.len() + self.probes[b].free.len();
+                let part = |probe, size| Part::screened(self, probe, Shape::Constant, &[size]);
+                let hypothesis = Hypothesis { parts: vec![part(a, sizes[0]), part(b, sizes[1])] };
+                ScreenedPair { hypothesis, score: 0.5 * gain - price(fitted, laps) }
+            })
+            .collect();
+        pairs.sort_by(|a, b| b.score.total_cmp(&a.score));
+        pairs.truncate(most);
+        pairs
+    }
+
+    fn pieces(&self, probe: usize) -> Vec<Piece> {
+        let nodes = self.nodes(probe);
+        let last = nodes.len().saturating_sub(2);
+        let piece = |(i, pair): (usize, &[(f64, White)])| Piece {
+            probe,
+            from_size: pair[0].0,
+            to_size: pair[1].0,
+            low: if i == 0 { -0.5 } else { 0.0 },
+            high: if i == last { 1.5 } else { 1.0 },
+            from: pair[0].1.clone(),
+            along: &pair[1].1 - &pair[0].1,
+        };
+        nodes.windows(2).enumerate().map(piece).collect()
+    }
+}
+
+/// Scalar products of everything that a pair's distance needs.
+struct Products {
+    along_along: DMatrix<f64>,
+    /// Rows: along; columns: from.
+    along_from: DMatrix<f64>,
+    from_from: DMatrix<f64>,
+    along_target: DVector<f64>,
+    from_target: DVector<f64>,
+}
+
+impl Products {
+    /// The squared distance that the best point of two pieces gains, and its shares of them.
+    fn best(&self, at: [usize; 2], pieces: [&Piece; 2]) -> (f64, [f64; 2]) {
+        let [i, j] = at;
+        // target - from_i - from_j, seen along each piece.
+        let seen = |k: usize| self.along_target[k] - self.along_from[(k, i)] - self.along_from[(k, j)];
+        let g = [seen(i), seen(j)];
+        let [a, b, c] = [self.along_along[(i, i)], self.along_along[(j, j)], self.along_along[(i, j)]];
+        let clamp = |k: usize, share: f64| share.clamp(pieces[k].low, pieces[k].high);
+        let determinant = a * b - c * c;
+        let mut shares = [0.0, 0.0];
+        if determinant > 1e-9 * a * b {
+            shares = [(b * g[0] - c * g[1]) / determinant, (a * g[1] - c * g[0]) / determinant];
+        }
+        // Within the bounds a few turns of coordinate descent end at the constrained minimum.
+        for _ in 0..4 {
+            shares[0] = clamp(0, if a > 0.0 { (g[0] - c * shares[1]) / a } else { 0.0 });
+            shares[1] = clamp(1, if b > 0.0 { (g[1] - c * shares[0]) / b } else { 0.0 });
+        }
+        let [s, t] = shares;
+        let constant = 2.0 * (self.from_target[i] + self.from_target[j])
+            - self.from_from[(i, i)]
+            - self.from_from[(j, j)]
+            - 2.0 * self.from_from[(i, j)];
+        let gain = constant + 2.0 * (s * g[0] + t * g[1]) - s * s * a - t * t * b - 2.0 * s * t * c;
+        (gain, shares)
+    }
+}

@@ -1,0 +1,182 @@
+//! Which effects are tried, and at what sizes.
+
+use sim::{Pattern, Setting, Spec, find};
+
+/// One way in which one effect may act: a line through its parameters, from the neutral values outwards.
+#[derive(Debug, Clone)]
+pub(super) struct Probe {
+    pub(super) spec: &'static Spec,
+    /// All parameters where the effect does nothing (or would, if it has a size).
+    origin: Vec<f64>,
+    /// How each parameter changes with the size.
+    direction: Vec<f64>,
+    /// Sizes that are simulated beforehand, rising; the neutral size is not among them.
+    pub(super) sizes: Vec<f64>,
+    /// The size at which the effect does nothing.
+    pub(super) neutral: f64,
+    /// Parameters that a fit may change, each with a step over which its action is about linear.
+    pub(super) free: Vec<(usize, f64)>,
+    /// Whether one simulated size stands for the opposite one too, mirrored.
+    pub(super) odd: bool,
+    /// The size comes in whole multiples of this.
+    pub(super) quantum: Option<f64>,
+}
+
+impl Probe {
+    /// The values of all parameters at a size.
+    pub(super) fn values(&self, size: f64) -> Vec<f64> {
+        self.origin.iter().zip(&self.direction).map(|(o, d)| o + d * (size - self.neutral)).collect()
+    }
+
+    /// The effect at a size.
+    pub(super) fn setting(&self, size: f64) -> Setting {
+        Setting { spec: self.spec, pattern: Pattern::Constant(self.values(size)) }
+    }
+
+    /// Values brought into their parameters' ranges.
+    pub(super) fn clamped(&self, values: &[f64]) -> Vec<f64> {
+        values.iter().zip(self.spec.params).map(|(v, p)| v.clamp(p.low, p.high)).collect()
+    }
+
+    /// What tells this probe from others of the same effect, for a reader.
+    pub(super) fn label(&self) -> String {
+        let moving = |i: usize| self.direction[i] != 0.0;
+        let fixed: Vec<String> = (self.spec.params.iter().zip(&self.origin).enumerate())
+            .filter(|(i, (param, _))| !moving(*i) && param.neutral.is_none())
+            .map(|(_, (param, value))| match param.choices.get(*value as usize) {
+                Some(choice) => format!("{} {choice}", param.name),
+                None => format!("{} {value:.3}", param.name),
+            })
+            .collect();
+        if fixed.is_empty() { self.spec.name.to_owned() } else { format!("{} ({})", self.spec.name, fixed.join(", ")) }
+    }
+}
+
+/// Sizes of the first parameter of an effect.
+fn line(name: &str, sizes: &[f64]) -> Vec<Probe> {
+    probe(name, &[], sizes, &[])
+}
+
+/// Sizes of an effect's first numeric parameter that has a neutral value; `fixed` sets others by name; `free` names further
+/// parameters that a fit may change, with their steps.
+fn probe(name: &str, fixed: &[(&str, f64)], sizes: &[f64], free: &[(&str, f64)]) -> Vec<Probe> {
+    let Ok(spec) = find(name) else { return Vec::new() };
+    let index = |key: &str| spec.params.iter().position(|p| p.name == key).expect("probes name parameters");
+    let size_index = spec
+        .params
+        .iter()
+        .position(|p| p.choices.is_empty() && !fixed.iter().any(|(key, _)| *key == p.name))
+        .expect("every probe has a size");
+    let mut origin: Vec<f64> = spec.params.iter().map(|p| p.neutral.unwrap_or(0.0)).collect();
+    for (key, value) in fixed {
+        origin[index(key)] = *value;
+    }
+    // What has no neutral value (a limit) does nothing where it is large.
+    let largest = sizes.iter().fold(0.0_f64, |m, s| m.max(s.abs()));
+    let neutral = spec.params[size_index].neutral.unwrap_or(2.5 * largest);
+    origin[size_index] = neutral;
+    let mut direction = vec![0.0; spec.params.len()];
+    direction[size_index] = 1.0;
+    let reach = sizes.iter().map(|s| (s - neutral).abs()).fold(0.0, f64::max);
+    let steps = [(size_index, 0.15 * reach)];
+    let free = steps.into_iter().chain(free.iter().map(|(key, step)| (index(key), *step))).collect();
+    vec![Probe { spec, origin, direction, sizes: sizes.to_vec(), neutral, free, odd: false, quantum: None }]
+}
+
+/// A vector of two parameters, in four directions; both are fitted.
+fn vector(name: &str, keys: [&str; 2], sizes: &[f64]) -> Vec<Probe> {
+    let h = std::f64::consts::FRAC_1_SQRT_2;
+    let mut probes = Vec::new();
+    for (a, b) in [(1.0, 0.0), (h, h), (0.0, 1.0), (-h, h)] {
+        for mut probe in probe(name, &[], sizes, &[]) {
+            let index = |key: &str| probe.spec.params.iter().position(|p| p.name == key).expect("probes name parameters");
+            let (i, j) = (index(keys[0]), index(keys[1]));
+            probe.direction.fill(0.0);
+            (probe.direction[i], probe.direction[j]) = (a, b);
+            let step = 0.15 * sizes.iter().fold(0.0_f64, |m, s| m.max(s.abs()));
+            probe.free = vec![(i, step), (j, step)];
+            probes.push(probe);
+        }
+    }
+    probes
+}
+
+/// A size with a direction, in eight of them; both are fitted.
+fn directed(name: &str, sizes: &[f64]) -> Vec<Probe> {
+    let azimuths = (0..8).map(|k| f64::from(k) * std::f64::consts::FRAC_PI_4 - std::f64::consts::PI);
+    azimuths.flat_map(|azimuth| probe(name, &[("azimuth_rad", azimuth)], sizes, &[("azimuth_rad", 0.15)])).collect()
+}
+
+/// One of the six sensors that the controllers use.
+fn sensors(name: &str, sizes: &[f64]) -> Vec<Probe> {
+    [0.0, 1.0, 2.0, 5.0, 6.0, 7.0].into_iter().flat_map(|s| probe(name, &[("sensor", s)], sizes, &[])).collect()
+}
+
+/// A place on one of the walls; place, length and size are fitted.
+fn places(name: &str, length_m: f64, size: f64) -> Vec<Probe> {
+    const PLACES: u32 = 24;
+    let mut probes = Vec::new();
+    for wall in [0.0, 1.0] {
+        for k in 0..PLACES {
+            let position = (f64::from(k) + 0.5) / f64::from(PLACES);
+            let fixed = [("wall", wall), ("position", position), ("length_m", length_m)];
+            let free = [("position", 0.008), ("length_m", 0.015)];
+            probes.extend(probe(name, &fixed, &[size], &free).into_iter().map(|p| Probe { odd: true, ..p }));
+        }
+    }
+    probes
+}
+
+/// Everything that is tried. A list of sizes spans what robots of this kind do; fits may leave it.
+///
+/// `controller-speed` is not among them, because laps cannot tell it from `wheel-scale`.
+pub(super) fn probes() -> Vec<Probe> {
+    let delay = |p: Probe| Probe { quantum: Some(0.032), ..p };
+    let steps: Vec<f64> = (1..=15).map(|k| 0.002 * f64::from(k)).collect();
+    let delays: Vec<f64> = (1..=10).map(|k| 0.032 * f64::from(k)).collect();
+    [
+        line("cone-of-view", &[0.1, 0.2, 0.3, 0.45, 0.6]),
+        line("reading-gain", &[0.7, 0.83, 0.93, 1.07, 1.2, 1.4]),
+        line("distance-scale", &[0.8, 0.9, 0.96, 1.04, 1.1, 1.25]),
+        line("response-exponent", &[0.75, 0.87, 0.95, 1.05, 1.13, 1.3]),
+        line("ambient-offset", &[-40.0, -15.0, 15.0, 40.0, 90.0]),
+        line("sensor-rotation", &[-0.12, -0.06, -0.02, 0.02, 0.06, 0.12]),
+        line("sensor-reach", &[0.7, 0.8, 0.88, 0.95, 1.06, 1.2]),
+        sensors("one-sensor-gain", &[0.6, 0.8, 0.92, 1.1, 1.3, 1.6]),
+        sensors("one-sensor-offset", &[-60.0, -20.0, 20.0, 60.0]),
+        directed("directional-light", &[8.0, 25.0]),
+        line("crosstalk", &[0.02, 0.06, 0.12, 0.2]),
+        line("sensor-lag", &[0.06, 0.12, 0.2, 0.3]),
+        line("reading-noise", &[0.3, 0.6, 1.5, 2.2, 3.5]),
+        line("reading-step", &[20.0, 45.0, 70.0, 95.0, 120.0, 145.0, 170.0, 200.0]),
+        line("reading-drift", &[-4e-4, -1.5e-4, 1.5e-4, 4e-4]),
+        line("incidence-falloff", &[0.3, 0.8, 1.6, 2.6]),
+        line("controller-gain", &[0.7, 0.83, 0.93, 1.07, 1.2, 1.4]),
+        line("wheel-asymmetry", &[0.97, 0.988, 1.012, 1.03]),
+        line("wheel-scale", &[0.93, 0.975, 1.025, 1.07]),
+        line("axle-length", &[0.85, 0.92, 0.97, 1.03, 1.08, 1.16]),
+        line("motor-lag", &[0.05, 0.1, 0.17, 0.25]),
+        probe("command-delay", &[], &delays, &[]).into_iter().map(delay).collect(),
+        line("dead-band", &[0.034, 0.037, 0.04, 0.043, 0.046]),
+        line("speed-step", &steps),
+        line("acceleration-limit", &[0.04, 0.08, 0.15, 0.3, 0.6, 1.5]),
+        line("turn-scrub", &[0.05, 0.12, 0.22, 0.35]),
+        line("battery-sag", &[-6e-5, 3e-5, 8e-5, 1.6e-4]),
+        directed("floor-tilt", &[4e-4, 1.2e-3]),
+        line("slip-level", &[0.2, 0.6, 1.5, 2.2, 3.5, 6.0]),
+        line("slip-memory", &[0.25, 0.45, 0.65, 0.85]),
+        line("outer-wall-offset", &[-0.012, -0.005, -0.0015, 0.0015, 0.005, 0.012]),
+        line("inner-wall-offset", &[-0.012, -0.005, -0.0015, 0.0015, 0.005, 0.012]),
+        places("wall-bump", 0.06, 0.008),
+        line("outer-wall-reflectance", &[0.65, 0.85, 1.15, 1.45]),
+        line("inner-wall-reflectance", &[0.65, 0.85, 1.15, 1.45]),
+        places("reflectance-patch", 0.09, 1.4),
+        line("camera-scale", &[0.985, 0.995, 1.005, 1.015]),
+        vector("camera-offset", ["dx_m", "dy_m"], &[-0.003, -0.001, 0.001, 0.003]),
+        line("camera-rotation", &[-0.012, -0.004, 0.004, 0.012]),
+        line("camera-distortion", &[-0.015, -0.005, 0.005, 0.015]),
+        vector("marker-offset", ["forward_m", "left_m"], &[-0.004, -0.0015, 0.0015, 0.004]),
+        line("camera-noise", &[0.4, 0.75, 1.4, 2.0, 3.0]),
+    ]
+    .concat()
+}

@@ -1,0 +1,292 @@
+//! The size of a hypothesis by simulation, and how well it then explains the data.
+
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+use super::atlas::{Atlas, Simulate, White, summary, white};
+use super::expectation::{Expectation, Scatter};
+use super::hypothesis::{Freedom, Hypothesis};
+use super::screen::price;
+use super::summary::Summary;
+
+/// Data sets simulated at each point of a round.
+const ROUND_SETS: u64 = 10;
+
+/// Data sets simulated at the end.
+const FINAL_SETS: u64 = 48;
+
+/// A hypothesis at its most likely sizes.
+#[derive(Debug, Clone)]
+pub(super) struct Refined {
+    pub(super) hypothesis: Hypothesis,
+    /// Standard errors of the fitted numbers, the simulation's own error included.
+    pub(super) errors: Vec<(Freedom, f64)>,
+    /// The data less what is expected, in units of this hypothesis' own scatter and the simulation's error.
+    pub(super) residual: White,
+    /// Log-likelihood gained over the declared model.
+    pub(super) gain: f64,
+    /// `gain` less the price of the fitted numbers.
+    pub(super) score: f64,
+}
+
+impl Refined {
+    /// Standard errors of one part's values in the order of its pattern's values; 0 for what was not fitted.
+    pub(super) fn errors_of(&self, part: usize, atlas: &Atlas) -> Vec<f64> {
+        self.hypothesis.parts[part].errors(part, &self.errors, atlas)
+    }
+}
+
+/// A hypothesis simulated.
+struct Evaluated {
+    expectation: Expectation,
+    /// Variance of the expectation in units of a data set's own.
+    error: f64,
+    summaries: Vec<Summary>,
+}
+
+/// A hypothesis on its way to its most likely sizes.
+#[derive(Debug, Clone)]
+pub(super) struct Descended {
+    pub(super) hypothesis: Hypothesis,
+    errors: Vec<(Freedom, f64)>,
+    /// Log-likelihood gained over the declared model less the price of the fitted numbers, as the last round saw it.
+    pub(super) score: f64,
+}
+
+impl Atlas {
+    /// The best sizes of a hypothesis, starting from those it has; `None` where the robot then crashes.
+    ///
+    /// Each round simulates the hypothesis at its sizes and a step to either side of each, with the same draws, takes the
+    /// means for parabolas in each number, and goes to where these are nearest to the data.
+    pub(super) fn descend(
+        &self,
+        simulate: &Simulate<'_>,
+        data: &Expectation,
+        start: &Hypothesis,
+        rounds: usize,
+    ) -> Option<Descended> {
+        let mut hypothesis = start.clone();
+        let mut freedoms = hypothesis.freedoms(self);
+        let mut errors = vec![f64::INFINITY; freedoms.len()];
+        let mut score = f64::NEG_INFINITY;
+        for _ in 0..rounds {
+            let local = self.local(simulate, &hypothesis, &freedoms)?;
+            let target = white(&local.scatter, &self.laps, data, &local.center);
+            let (moves, covariance) = local.nearest(&target, &freedoms);
+            let left = local.left(&target, &moves).norm_squared() / (1.0 + local.error);
+            score = self.gain(data, left, local.scatter.log_det) - price(freedoms.len(), self.laps.iter().sum());
+            let settled = (0..moves.len()).all(|i| moves[i].abs() < 0.5 * covariance[(i, i)].sqrt());
+            let by: Vec<(Freedom, f64)> = freedoms.iter().copied().zip(moves.iter().copied()).collect();
+            hypothesis = hypothesis.moved(self, &by);
+            for (i, freedom) in freedoms.iter_mut().enumerate() {
+                errors[i] = (covariance[(i, i)] * (1.0 + local.error)).sqrt();
+                // The parabola should hold where the answer may lie.
+                let reach = (3.0 * errors[i]).max(moves[i].abs());
+                freedom.step = reach.clamp(0.2 * freedom.step, freedom.step);
+            }
+            if settled {
+                break;
+            }
+        }
+        let errors = freedoms.into_iter().zip(errors).collect();
+        Some(Descended { hypothesis: self.quantised(hypothesis), errors, score })
+    }
+
+    /// A hypothesis at its most likely sizes, simulated often enough to judge it.
+    pub(super) fn settle(&self, simulate: &Simulate<'_>, data: &Expectation, found: &Descended) -> Option<Refined> {
+        let end = self.evaluate(simulate, &found.hypothesis, FINAL_SETS)?;
+        self.judge(data, found.hypothesis.clone(), found.errors.clone(), &end)
+    }
+
+    /// Log-likelihood gained over the declared model by a hypothesis that leaves a squared distance of `left` in units of its own
+    /// scatter.
+    fn gain(&self, data: &Expectation, left: f64, log_det: f64) -> f64 {
+        let before = self.white(data, &self.null).norm_squared();
+        // Every run's mean lap and the trend are each a draw of one lap's covariance.
+        let vectors = (self.laps.len() + 1) as f64;
+        0.5 * (before - left - vectors * (log_det - self.scatter.log_det))
+    }
+
+    /// Sizes that come in steps brought to the nearest.
+    fn quantised(&self, mut hypothesis: Hypothesis) -> Hypothesis {
+        for part in &mut hypothesis.parts {
+            let probe = &self.probes[part.probe];
+            if let Some(quantum) = probe.quantum {
+                let i = probe.free[0].0;
+                part.values.iter_mut().for_each(|values| values[i] = (values[i] / quantum).round() * quantum);
+            }
+        }
+        hypothesis
+    }
+
+    /// How well a simulated hypothesis explains the data.
+    fn judge(
+        &self,
+        data: &Expectation,
+        hypothesis: Hypothesis,
+        errors: Vec<(Freedom, f64)>,
+        end: &Evaluated,
+    ) -> Option<Refined> {
+        let scatter = Scatter::of_laps(end.summaries.iter(), &self.scatter)?;
+        let residual = white(&scatter, &self.laps, data, &end.expectation) / (1.0 + end.error).sqrt();
+        let gain = self.gain(data, residual.norm_squared(), scatter.log_det);
+        let score = gain - price(errors.len(), self.laps.iter().sum());
+        Some(Refined { hypothesis, errors, residual, gain, score })
+    }
+
+    /// Simulates a hypothesis. What the draws of these data sets did to the declared model is taken off as far as it
+    /// helps (a control variate).
+    fn evaluate(&self, simulate: &Simulate<'_>, hypothesis: &Hypothesis, sets: u64) -> Option<Evaluated> {
+        let settings = hypothesis.settings(self);
+        let summaries: Vec<Summary> =
+            (0..sets).into_par_iter().map(|set| summary(simulate, &settings, set)).collect::<Option<_>>()?;
+        let alike = hypothesis.alike();
+        let mean = Expectation::of(summaries.iter(), alike);
+        let declared = &self.samples[..sets as usize];
+        let declared_mean = Expectation::mean(declared, alike);
+        let (mut both, mut own) = (0.0, 0.0);
+        for (summary, sample) in summaries.iter().zip(declared) {
+            let sample = self.white(sample, &declared_mean);
+            both += self.white(&Expectation::of(std::iter::once(summary), false), &mean).dot(&sample);
+            own += sample.norm_squared();
+        }
+        let share = (both / own).clamp(0.0, 1.0);
+        let expectation = mean.moved(share, &declared_mean, &self.null);
+        let error = (1.0 - share * share) / sets as f64 + share * share / self.samples.len() as f64;
+        Some(Evaluated { expectation, error, summaries })
+    }
+
+    fn local(&self, simulate: &Simulate<'_>, hypothesis: &Hypothesis, freedoms: &[Freedom]) -> Option<Local> {
+        let center = self.evaluate(simulate, hypothesis, ROUND_SETS)?;
+        let mut sides = Vec::with_capacity(freedoms.len());
+        for group in groups(freedoms) {
+            let at = |sign: f64| {
+                let moves: Vec<(Freedom, f64)> = group.iter().map(|f| (*f, sign * f.step)).collect();
+                let moved = hypothesis.moved(self, &moves);
+                let by: Vec<f64> = group.iter().map(|f| moved.get(f) - hypothesis.get(f)).collect();
+                self.evaluate(simulate, &moved, ROUND_SETS).map(|evaluated| (by, evaluated))
+            };
+            let (down, up) = (at(-1.0)?, at(1.0)?);
+            sides.push((group, down, up));
+        }
+        let all = sides.iter().flat_map(|(_, a, b)| a.1.summaries.iter().chain(&b.1.summaries));
+        let scatter = Scatter::of_laps(center.summaries.iter().chain(all), &self.scatter)?;
+        let action = |e: &Evaluated| white(&scatter, &self.laps, &e.expectation, &center.expectation);
+        let lap = self.null.trend.len();
+        let mut columns = Vec::new();
+        for (group, (down_by, down), (up_by, up)) in &sides {
+            let (down, up) = (action(down), action(up));
+            for (i, freedom) in group.iter().enumerate() {
+                let mask = |w: &White| freedom.run().map_or_else(|| w.clone(), |run| of_run(w, run, lap, self.laps.len()));
+                columns.push(Column::through((down_by[i], mask(&down)), (up_by[i], mask(&up))));
+            }
+        }
+        Some(Local { center: center.expectation, error: center.error, scatter, columns })
+    }
+}
+
+/// Freedoms that are moved together: the sizes of one part in its runs.
+fn groups(freedoms: &[Freedom]) -> Vec<Vec<Freedom>> {
+    let mut groups: Vec<Vec<Freedom>> = Vec::new();
+    for freedom in freedoms {
+        match groups.last_mut() {
+            Some(group) if freedom.run().is_some() && freedom.is_beside(&group[0]) => group.push(*freedom),
+            _ => groups.push(vec![*freedom]),
+        }
+    }
+    groups
+}
+
+/// What one run's size does: that run's mean, and its share of the trend and the second-order numbers.
+fn of_run(action: &White, run: usize, lap: usize, runs: usize) -> White {
+    let mut own = action / runs as f64;
+    for r in 0..runs {
+        if r == run {
+            own.rows_mut(r * lap, lap).copy_from(&action.rows(r * lap, lap));
+        } else {
+            own.rows_mut(r * lap, lap).fill(0.0);
+        }
+    }
+    own
+}
+
+/// A hypothesis and its neighbourhood.
+struct Local {
+    center: Expectation,
+    error: f64,
+    scatter: Scatter,
+    columns: Vec<Column>,
+}
+
+/// The action of one number: slope and curvature.
+struct Column {
+    slope: White,
+    curvature: White,
+}
+
+impl Column {
+    /// The parabola through the origin and two points.
+    fn through(down: (f64, White), up: (f64, White)) -> Self {
+        let (a, b) = (down.0, up.0);
+        if a == 0.0 || b == 0.0 {
+            // At the end of the range there is one side only.
+            let (by, action) = if a == 0.0 { up } else { down };
+            let slope = if by == 0.0 { action * 0.0 } else { action / by };
+            return Self { curvature: &slope * 0.0, slope };
+        }
+        let curvature = (&up.1 / b - &down.1 / a) / (b - a);
+        let slope = &up.1 / b - &curvature * b;
+        Self { slope, curvature }
+    }
+}
+
+impl Local {
+    /// The moves that bring the parabolas nearest to the target, and their covariance.
+    fn nearest(&self, target: &White, freedoms: &[Freedom]) -> (DVector<f64>, DMatrix<f64>) {
+        let count = self.columns.len();
+        let mut moves = DVector::<f64>::zeros(count);
+        let mut normal = DMatrix::identity(count, count);
+        for _ in 0..30 {
+            let left = self.left(target, &moves);
+            let slopes: Vec<White> =
+                self.columns.iter().zip(moves.iter()).map(|(c, m)| &c.slope + &c.curvature * (2.0 * m)).collect();
+            normal = DMatrix::from_fn(count, count, |i, j| slopes[i].dot(&slopes[j]));
+            // A number without action stays where it is.
+            for (i, freedom) in freedoms.iter().enumerate() {
+                normal[(i, i)] += 1e-6 / (freedom.step * freedom.step);
+            }
+            let gradient = DVector::from_fn(count, |i, _| slopes[i].dot(&left));
+            let Some(step) = normal.clone().cholesky().map(|f| f.solve(&gradient)) else { break };
+            let mut share = 1.0;
+            let mut next = self.bounded(&moves, &step, share, freedoms);
+            while self.left(target, &next).norm_squared() > left.norm_squared() && share > 1e-3 {
+                share *= 0.5;
+                next = self.bounded(&moves, &step, share, freedoms);
+            }
+            let change = (&next - &moves).component_div(&DVector::from_fn(count, |i, _| freedoms[i].step)).amax();
+            moves = next;
+            if change < 1e-6 {
+                break;
+            }
+        }
+        let covariance = normal.cholesky().map_or_else(|| DMatrix::identity(count, count), |f| f.inverse());
+        (moves, covariance)
+    }
+
+    fn left(&self, target: &White, moves: &DVector<f64>) -> White {
+        let mut left = target.clone();
+        for (column, &m) in self.columns.iter().zip(moves.iter()) {
+            left.axpy(-m, &column.slope, 1.0);
+            left.axpy(-m * m, &column.curvature, 1.0);
+        }
+        left
+    }
+
+    /// A parabola is trusted for twice the step it was made with.
+    fn bounded(&self, moves: &DVector<f64>, step: &DVector<f64>, share: f64, freedoms: &[Freedom]) -> DVector<f64> {
+        DVector::from_fn(moves.len(), |i, _| {
+            let most = 2.5 * freedoms[i].step;
+            (moves[i] + share * step[i]).clamp(-most, most)
+        })
+    }
+}

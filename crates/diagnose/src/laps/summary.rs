@@ -1,0 +1,174 @@
+//! Laps as vectors, and a data set of them as the numbers that tell effects apart.
+
+use nalgebra::{DMatrix, DVector};
+use track::Lap;
+
+/// Blocks of gates whose durations are part of a lap's vector.
+pub(super) const BLOCKS: usize = 20;
+
+/// Numbers of second order: see [`second_order`].
+pub(super) const SECOND: usize = 20;
+
+/// One lap: positions at the gates in mm, then durations of [`BLOCKS`] equal stretches in units of 10 ms.
+///
+/// The units make all entries of similar size. A block's duration runs from gate to gate, so that it is the same for
+/// laps driven either way round.
+pub(super) fn lap_vector(lap: &Lap) -> DVector<f64> {
+    let gates = lap.offsets_m.len();
+    let backward = gates > 1 && lap.times_s[1] > lap.times_s[gates - 1];
+    // The time at the border before gate g; border `gates` closes the lap.
+    let time = |border: usize| match (border, backward) {
+        (0, true) => lap.end_s,
+        (border, false) if border == gates => lap.end_s,
+        (border, true) if border == gates => lap.start_s,
+        (border, _) => lap.times_s[border],
+    };
+    let border = |block: usize| block * gates / BLOCKS;
+    let durations = (0..BLOCKS).map(|b| 100.0 * (time(border(b + 1)) - time(border(b))).abs());
+    DVector::from_iterator(gates + BLOCKS, lap.offsets_m.iter().map(|m| 1000.0 * m).chain(durations))
+}
+
+/// What one run tells of its laps' mean and its change.
+#[derive(Debug, Clone)]
+pub(super) struct RunSummary {
+    /// Number of laps.
+    pub(super) laps: usize,
+    /// Mean lap.
+    pub(super) mean: DVector<f64>,
+    /// Sum over the laps of lap x position in the run, the positions centred and of unit norm: its covariance is that of one lap.
+    pub(super) trend: DVector<f64>,
+}
+
+/// What a data set tells.
+#[derive(Debug, Clone)]
+pub(crate) struct Summary {
+    pub(super) runs: Vec<RunSummary>,
+    /// See [`second_order`].
+    pub(super) second: DVector<f64>,
+    /// Scatter of the laps about their run's line, and its degrees of freedom.
+    pub(super) scatter: DMatrix<f64>,
+    pub(super) freedom: usize,
+}
+
+impl Summary {
+    /// The summary of runs of closed laps; `None` if a run has fewer than three, or they have too few gates.
+    pub(crate) fn new(runs: &[Vec<Lap>]) -> Option<Self> {
+        let vectors: Vec<Vec<DVector<f64>>> =
+            runs.iter().map(|laps| laps.iter().map(lap_vector).collect()).collect();
+        let finite = vectors.iter().flatten().all(|lap| lap.iter().all(|x| x.is_finite()));
+        if !finite || vectors.is_empty() || vectors.iter().any(|laps| laps.len() < 3) {
+            return None;
+        }
+        let size = vectors[0][0].len();
+        let mut scatter = DMatrix::zeros(size, size);
+        let mut freedom = 0;
+        let mut summaries = Vec::with_capacity(vectors.len());
+        for laps in &vectors {
+            let summary = summarise(laps);
+            let ramp = ramp(laps.len());
+            let residuals = DMatrix::from_fn(size, laps.len(), |i, j| {
+                laps[j][i] - summary.mean[i] - ramp[j] * summary.trend[i]
+            });
+            scatter.gemm(1.0, &residuals, &residuals.transpose(), 1.0);
+            freedom += laps.len() - 2;
+            summaries.push(summary);
+        }
+        let second = second_order(&vectors);
+        Some(Self { runs: summaries, second, scatter, freedom })
+    }
+
+    /// Laps in all.
+    pub(super) fn laps(&self) -> usize {
+        self.runs.iter().map(|run| run.laps).sum()
+    }
+}
+
+/// Positions of n laps in their run, centred and of unit norm.
+pub(super) fn ramp(n: usize) -> Vec<f64> {
+    let middle = (n as f64 - 1.0) / 2.0;
+    let norm = (0..n).map(|j| (j as f64 - middle).powi(2)).sum::<f64>().sqrt();
+    (0..n).map(|j| (j as f64 - middle) / norm).collect()
+}
+
+fn summarise(laps: &[DVector<f64>]) -> RunSummary {
+    let size = laps[0].len();
+    let (mut mean, mut trend) = (DVector::zeros(size), DVector::zeros(size));
+    for (lap, position) in laps.iter().zip(ramp(laps.len())) {
+        mean.axpy(1.0 / laps.len() as f64, lap, 1.0);
+        trend.axpy(position, lap, 1.0);
+    }
+    RunSummary { laps: laps.len(), mean, trend }
+}
+
+/// How the laps scatter, as [`SECOND`] numbers: log variance about the means of a run's quarters in 10 blocks of gates and
+/// 5 of durations; log mean square of second differences along the lap at spacing 1 and 5 gates, and log kurtosis of the
+/// first; kurtosis and skewness of the durations.
+fn second_order(runs: &[Vec<DVector<f64>>]) -> DVector<f64> {
+    let size = runs[0][0].len();
+    let gates = size - BLOCKS;
+    let (mut squares, mut freedom) = (DVector::<f64>::zeros(size), 0.0);
+    let (mut rough1, mut rough5) = (Moments::default(), Moments::default());
+    let mut durations = Moments::default();
+    for quarter in runs.iter().flat_map(|laps| quarters(laps)) {
+        let mean = quarter.iter().sum::<DVector<f64>>() / quarter.len() as f64;
+        freedom += quarter.len() as f64 - 1.0;
+        for lap in quarter {
+            let deviation = lap - &mean;
+            squares += deviation.component_mul(&deviation);
+            for g in 1..gates - 1 {
+                rough1.add(deviation[g - 1] - 2.0 * deviation[g] + deviation[g + 1]);
+            }
+            for g in 5..gates.saturating_sub(5) {
+                rough5.add(deviation[g - 5] - 2.0 * deviation[g] + deviation[g + 5]);
+            }
+            deviation.rows(gates, BLOCKS).iter().for_each(|&d| durations.add(d));
+        }
+    }
+    let log_variance = |from: usize, to: usize| (squares.rows(from, to - from).sum() / freedom / (to - from) as f64).ln();
+    let gate_blocks = (0..10).map(|b| log_variance(b * gates / 10, (b + 1) * gates / 10));
+    let time_blocks = (0..5).map(|b| log_variance(gates + 4 * b, gates + 4 * (b + 1)));
+    let others = [
+        rough1.square().ln(),
+        rough5.square().ln(),
+        rough1.kurtosis().ln(),
+        durations.kurtosis(),
+        durations.skewness(),
+    ];
+    DVector::from_iterator(SECOND, gate_blocks.chain(time_blocks).chain(others))
+}
+
+/// A run's laps in four parts of about the same length, of two laps at least.
+fn quarters(laps: &[DVector<f64>]) -> impl Iterator<Item = &[DVector<f64>]> {
+    let parts = (laps.len() / 2).clamp(1, 4);
+    (0..parts).map(move |k| &laps[k * laps.len() / parts..(k + 1) * laps.len() / parts])
+}
+
+/// Sums of the first four powers.
+#[derive(Debug, Default)]
+struct Moments([f64; 5]);
+
+impl Moments {
+    fn add(&mut self, x: f64) {
+        let mut power = 1.0;
+        for sum in &mut self.0 {
+            *sum += power;
+            power *= x;
+        }
+    }
+
+    fn about_zero(&self, power: usize) -> f64 {
+        self.0[power] / self.0[0]
+    }
+
+    fn square(&self) -> f64 {
+        self.about_zero(2)
+    }
+
+    fn kurtosis(&self) -> f64 {
+        self.about_zero(4) / self.square().powi(2)
+    }
+
+    fn skewness(&self) -> f64 {
+        self.about_zero(3) / self.square().powf(1.5)
+    }
+}

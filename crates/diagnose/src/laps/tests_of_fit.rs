@@ -1,0 +1,72 @@
+//! Four numbers that say whether, and in what, a data set departs from what was expected.
+
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+
+use super::atlas::White;
+use super::summary::SECOND;
+
+/// A sum of squares with its probability under the expectation.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Quadratic {
+    /// Sum of squares, in units in which each has expectation 1.
+    pub q: f64,
+    /// Number of squares.
+    pub freedom: usize,
+    /// Probability of such a sum or a larger one.
+    pub p: f64,
+}
+
+impl Quadratic {
+    fn new(q: f64, freedom: usize) -> Self {
+        let p = match ChiSquared::new(freedom as f64) {
+            Ok(chi2) => chi2.sf(q),
+            // No squares, no evidence.
+            Err(_) => 1.0,
+        };
+        Self { q, freedom, p }
+    }
+
+    /// What exceeds the expectation.
+    pub fn excess(&self) -> f64 {
+        self.q - self.freedom as f64
+    }
+}
+
+/// Where a data set departs from what was expected: in its mean lap, from run to run, drifting within the runs, or in how its laps scatter.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FourNumbers {
+    /// The mean lap.
+    pub mean: Quadratic,
+    /// The runs' means among each other.
+    pub runs: Quadratic,
+    /// The change within the runs.
+    pub trend: Quadratic,
+    /// The scatter of the laps.
+    pub noise: Quadratic,
+}
+
+impl FourNumbers {
+    /// Of a residual in white; `laps` are the numbers of laps of the runs.
+    pub(super) fn new(residual: &White, laps: &[usize]) -> Self {
+        let runs = laps.len();
+        let lap = (residual.len() - SECOND) / (runs + 1);
+        let total: usize = laps.iter().sum();
+        let mut mean = White::zeros(lap);
+        for (r, &n) in laps.iter().enumerate() {
+            mean.axpy((n as f64 / total as f64).sqrt(), &residual.rows(r * lap, lap).into_owned(), 1.0);
+        }
+        let all = residual.rows(0, runs * lap).norm_squared();
+        Self {
+            mean: Quadratic::new(mean.norm_squared(), lap),
+            runs: Quadratic::new(all - mean.norm_squared(), (runs - 1) * lap),
+            trend: Quadratic::new(residual.rows(runs * lap, lap).norm_squared(), lap),
+            noise: Quadratic::new(residual.rows((runs + 1) * lap, SECOND).norm_squared(), SECOND),
+        }
+    }
+
+    /// Probability that the smallest of the four is as small as it is: four times that (Bonferroni).
+    pub fn omnibus_p(&self) -> f64 {
+        let least = [self.mean, self.runs, self.trend, self.noise].map(|q| q.p).into_iter().fold(1.0, f64::min);
+        (4.0 * least).min(1.0)
+    }
+}

@@ -1,0 +1,165 @@
+//! What is tried: every effect of the registry that acts on the motion, the readings, the walls or the camera, with the
+//! places, sensors and sizes at which its column of derivatives is taken.
+
+use std::f64::consts::TAU;
+
+use sim::{EFFECTS, Setting, Spec};
+
+/// How the multiples of a variant's columns become values.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Shape {
+    /// One column for each fitted value: value = neutral + multiple * step.
+    Linear,
+    /// Two columns, along x and y, of an effect with a size and an azimuth.
+    Polar,
+    /// One column at a place that is given: only the size is a multiple of it.
+    Along,
+    /// One column at a size that is given.
+    Scan,
+}
+
+/// One way in which an effect might be there.
+#[derive(Debug, Clone)]
+pub(crate) struct Variant {
+    pub(crate) spec: &'static Spec,
+    pub(crate) shape: Shape,
+    /// Values at which the columns are taken (the place and the size; for [`Shape::Linear`] the neutral ones).
+    pub(crate) values: Vec<f64>,
+    /// Which values a refinement fits.
+    pub(crate) free: Vec<usize>,
+    /// Which values the columns are along.
+    pub(crate) sizes: Vec<usize>,
+    /// Step of each column.
+    pub(crate) steps: Vec<f64>,
+}
+
+impl Variant {
+    fn linear(spec: &'static Spec, values: &[f64], steps: &[(usize, f64)]) -> Self {
+        let free: Vec<usize> = steps.iter().map(|s| s.0).collect();
+        let steps = steps.iter().map(|s| s.1).collect();
+        Self { spec, shape: Shape::Linear, values: values.to_vec(), sizes: free.clone(), free, steps }
+    }
+
+    /// The settings whose columns are taken.
+    pub(crate) fn settings(&self) -> Vec<Setting> {
+        let with = |changes: &[(usize, f64)]| {
+            let mut values = self.values.clone();
+            changes.iter().for_each(|&(i, value)| values[i] = value);
+            Setting::constant(self.spec, values)
+        };
+        match self.shape {
+            Shape::Scan => vec![with(&[])],
+            Shape::Polar => [0.0, 0.25 * TAU].map(|azimuth| with(&[(0, self.steps[0]), (1, azimuth)])).to_vec(),
+            Shape::Linear | Shape::Along => (self.sizes.iter().zip(&self.steps))
+                .map(|(&i, step)| with(&[(i, self.values[i] + step)]))
+                .collect(),
+        }
+    }
+
+    /// The values that these multiples of the columns stand for, inside their ranges.
+    pub(crate) fn values_at(&self, multiples: &[f64]) -> Vec<f64> {
+        let mut values = self.values.clone();
+        match self.shape {
+            Shape::Scan => {}
+            Shape::Polar => {
+                values[0] = self.steps[0] * multiples[0].hypot(multiples[1]);
+                values[1] = multiples[1].atan2(multiples[0]);
+            }
+            Shape::Linear | Shape::Along => {
+                for ((&i, step), multiple) in self.sizes.iter().zip(&self.steps).zip(multiples) {
+                    values[i] += step * multiple;
+                }
+            }
+        }
+        for (value, param) in values.iter_mut().zip(self.spec.params) {
+            *value = value.clamp(param.low, param.high);
+        }
+        values
+    }
+}
+
+/// All variants. `wall_lengths_m` are those of the outer and the inner wall.
+pub(crate) fn variants(wall_lengths_m: [f64; 2]) -> Vec<Variant> {
+    EFFECTS.iter().flat_map(|spec| of(spec, wall_lengths_m)).collect()
+}
+
+/// The variants of one effect; none for the effects on the controller and on noise, which are judged otherwise.
+fn of(spec: &'static Spec, wall_lengths_m: [f64; 2]) -> Vec<Variant> {
+    let one = |neutral: f64, step: f64| vec![Variant::linear(spec, &[neutral], &[(0, step)])];
+    let scan = |sizes: &[f64]| -> Vec<Variant> {
+        (sizes.iter())
+            .map(|&size| Variant {
+                spec,
+                shape: Shape::Scan,
+                values: vec![size],
+                free: vec![0],
+                sizes: vec![0],
+                steps: vec![size],
+            })
+            .collect()
+    };
+    let sensors = |neutral: f64, step: f64| {
+        (0..8).map(|sensor| Variant::linear(spec, &[f64::from(sensor), neutral], &[(1, step)])).collect()
+    };
+    match spec.name {
+        "reading-gain" | "distance-scale" | "response-exponent" => one(1.0, 0.01),
+        "outer-wall-reflectance" | "inner-wall-reflectance" => one(1.0, 0.01),
+        "wheel-asymmetry" | "wheel-scale" | "axle-length" | "camera-scale" => one(1.0, 0.002),
+        "ambient-offset" => one(0.0, 0.5),
+        "sensor-rotation" => one(0.0, 0.003),
+        "crosstalk" | "incidence-falloff" | "turn-scrub" => one(0.0, 0.01),
+        "reading-drift" | "battery-sag" => one(0.0, 1e-5),
+        "outer-wall-offset" | "inner-wall-offset" => one(0.0, 1e-4),
+        "camera-rotation" => one(0.0, 1e-3),
+        "camera-distortion" => one(0.0, 2e-3),
+        "marker-offset" => vec![Variant::linear(spec, &[0.0; 3], &[(0, 5e-4), (1, 5e-4)])],
+        "camera-offset" => vec![Variant::linear(spec, &[0.0; 2], &[(0, 2e-4), (1, 2e-4)])],
+        "one-sensor-gain" => sensors(1.0, 0.02),
+        "one-sensor-offset" => sensors(0.0, 1.0),
+        "cone-of-view" => scan(&[0.08, 0.15, 0.25, 0.4, 0.6]),
+        "sensor-reach" => scan(&[0.5, 0.65, 0.75, 0.85, 0.92, 0.96, 1.04, 1.1, 1.2]),
+        "sensor-lag" => scan(&[0.04, 0.08, 0.15, 0.3, 0.6]),
+        "motor-lag" => scan(&[0.01, 0.03, 0.08, 0.15, 0.3, 0.6]),
+        "command-delay" => scan(&[0.032, 0.064, 0.096, 0.128, 0.192, 0.256, 0.32, 0.416, 0.512]),
+        "dead-band" => scan(&[0.01, 0.02, 0.03, 0.036, 0.04, 0.043, 0.046, 0.05, 0.055, 0.06]),
+        "acceleration-limit" => scan(&[0.02, 0.04, 0.08, 0.15, 0.3, 0.6, 1.2, 2.4]),
+        "speed-step" => scan(&(2..60).map(|i| 5e-4 * f64::from(i)).collect::<Vec<_>>()),
+        "floor-tilt" => vec![Variant {
+            spec,
+            shape: Shape::Polar,
+            values: vec![0.0, 0.0],
+            free: vec![0, 1],
+            sizes: vec![0, 1],
+            steps: vec![1e-4, 1e-4],
+        }],
+        "directional-light" => (0..12)
+            .map(|i| along(spec, &[0.0, TAU / 12.0 * f64::from(i)], (0, 1.0), &[0, 1]))
+            .collect(),
+        "wall-bump" => places(wall_lengths_m, 0.08)
+            .map(|(wall, position)| along(spec, &[wall, position, 0.0, 0.08], (2, 5e-4), &[1, 2, 3]))
+            .collect(),
+        "reflectance-patch" => places(wall_lengths_m, 0.1)
+            .map(|(wall, position)| along(spec, &[wall, position, 0.1, 1.0], (3, 0.02), &[1, 2, 3]))
+            .collect(),
+        _ => Vec::new(),
+    }
+}
+
+fn along(spec: &'static Spec, values: &[f64], (size, step): (usize, f64), free: &[usize]) -> Variant {
+    Variant {
+        spec,
+        shape: Shape::Along,
+        values: values.to_vec(),
+        free: free.to_vec(),
+        sizes: vec![size],
+        steps: vec![step],
+    }
+}
+
+/// Places along both walls, about `spacing_m` apart.
+fn places(wall_lengths_m: [f64; 2], spacing_m: f64) -> impl Iterator<Item = (f64, f64)> {
+    wall_lengths_m.into_iter().enumerate().flat_map(move |(wall, length_m)| {
+        let count = (length_m / spacing_m).ceil() as usize;
+        (0..count).map(move |i| (wall as f64, i as f64 / count as f64))
+    })
+}

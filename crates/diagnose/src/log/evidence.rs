@@ -1,0 +1,154 @@
+//! The logs, prepared once, and how well a model with given effects explains them.
+
+use rayon::prelude::*;
+use sim::{Forecast, Model, Pattern, Scene, Setting, World};
+
+use super::columns::column;
+use super::filter::{Trace, Used, clear_readings, filter};
+use super::rows::{LogRow, stretches};
+use super::screen::{Normal, normal_of};
+
+/// A stretch of one run's log and what of it counts.
+#[derive(Debug)]
+pub(crate) struct Stretch<'a> {
+    pub(crate) run: usize,
+    pub(crate) rows: &'a [LogRow],
+    pub(crate) used: Vec<Used>,
+}
+
+/// The logs with the declared model.
+#[derive(Debug)]
+pub(crate) struct Evidence<'a> {
+    pub(crate) scene: &'a Scene,
+    pub(crate) model: &'a Model,
+    pub(crate) stretches: Vec<Stretch<'a>>,
+}
+
+/// One value that is fitted: which setting, which of its values, and the step of its derivative.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Knob {
+    pub(crate) setting: usize,
+    pub(crate) value: usize,
+    /// Whether it is the change per second of a pattern by time.
+    pub(crate) slope: bool,
+    pub(crate) step: f64,
+}
+
+impl Knob {
+    /// The value in these settings; a pattern by run has none of its own.
+    pub(crate) fn of<'s>(&self, settings: &'s mut [Setting]) -> &'s mut f64 {
+        match &mut settings[self.setting].pattern {
+            Pattern::Constant(values) => &mut values[self.value],
+            Pattern::ByTime { per_s, .. } if self.slope => &mut per_s[self.value],
+            Pattern::ByTime { start, .. } => &mut start[self.value],
+            Pattern::ByRun(runs) => &mut runs[0][self.value],
+        }
+    }
+
+    /// The settings with the value changed by a multiple of the step, kept inside its range.
+    pub(crate) fn turned(&self, settings: &[Setting], multiple: f64) -> Vec<Setting> {
+        let mut turned = settings.to_vec();
+        let param = &settings[self.setting].spec.params[self.value];
+        let value = self.of(&mut turned);
+        *value += multiple * self.step;
+        if !self.slope {
+            *value = value.clamp(param.low, param.high);
+        }
+        turned
+    }
+}
+
+/// How well one model explains the logs, and how its values would have to change to do better.
+#[derive(Debug, Clone)]
+pub(crate) struct Assessment {
+    /// By stretch.
+    pub(crate) log_likelihood: Vec<f64>,
+    /// By stretch, in steps of the knobs.
+    pub(crate) normals: Vec<Normal>,
+}
+
+impl Assessment {
+    pub(crate) fn total(&self) -> f64 {
+        self.log_likelihood.iter().sum()
+    }
+}
+
+impl<'a> Evidence<'a> {
+    /// Prepares the runs: the declared model's poses decide which readings count. Without a stretch that can be
+    /// filtered there is no evidence.
+    pub(crate) fn new(scene: &'a Scene, model: &'a Model, runs: &'a [&'a [LogRow]]) -> Result<Self, sim::Error> {
+        let pieces: Vec<(usize, &[LogRow])> = (runs.iter().enumerate())
+            .flat_map(|(run, rows)| stretches(rows, &model.run).into_iter().map(move |piece| (run, piece)))
+            .collect();
+        let stretches = pieces
+            .into_par_iter()
+            .map(|(run, rows)| {
+                let world = scene.world(model, run)?;
+                let first = filter(&world, rows, None);
+                Ok(first.map(|trace| Stretch { run, rows, used: clear_readings(&world, &trace, rows) }))
+            })
+            .collect::<Result<Vec<_>, sim::Error>>()?;
+        Ok(Self { scene, model, stretches: stretches.into_iter().flatten().collect() })
+    }
+
+    /// The part of the evidence that one run gives.
+    pub(crate) fn of_run(&self, run: usize) -> Self {
+        let stretches = (self.stretches.iter().filter(|stretch| stretch.run == run))
+            .map(|stretch| Stretch { run, rows: stretch.rows, used: stretch.used.clone() })
+            .collect();
+        Self { scene: self.scene, model: self.model, stretches }
+    }
+
+    pub(crate) fn world(&self, settings: &[Setting], run: usize) -> Result<World<'a>, sim::Error> {
+        let mut model = self.model.clone();
+        model.effects.extend(settings.iter().cloned());
+        self.scene.world(&model, run)
+    }
+
+    /// All stretches filtered with these effects added; `None` where the filter lost the robot.
+    pub(crate) fn traces(&self, settings: &[Setting]) -> Option<Vec<(World<'a>, Trace)>> {
+        self.stretches
+            .par_iter()
+            .map(|stretch| {
+                let world = self.world(settings, stretch.run).ok()?;
+                let trace = filter(&world, stretch.rows, Some(&stretch.used))?;
+                Some((world, trace))
+            })
+            .collect()
+    }
+
+    /// The log-likelihood with these effects and its derivatives with the knobs.
+    pub(crate) fn assess(&self, settings: &[Setting], knobs: &[Knob]) -> Option<Assessment> {
+        let parts: Option<Vec<(f64, Normal)>> = self
+            .stretches
+            .par_iter()
+            .map(|stretch| {
+                let world = self.world(settings, stretch.run).ok()?;
+                let trace = filter(&world, stretch.rows, Some(&stretch.used))?;
+                let columns = knobs
+                    .par_iter()
+                    .map(|knob| self.derivative(&world, &trace, settings, knob))
+                    .collect::<Option<Vec<_>>>()?;
+                Some((trace.log_likelihood, normal_of(&trace, &columns)))
+            })
+            .collect();
+        let (log_likelihood, normals) = parts?.into_iter().unzip();
+        Some(Assessment { log_likelihood, normals })
+    }
+
+    /// Change of the whitened innovations for one step of a knob, from the side that is inside its range.
+    fn derivative(&self, world: &World<'a>, trace: &Trace, settings: &[Setting], knob: &Knob) -> Option<Vec<f32>> {
+        let run = world.run();
+        let mut sign = 1.0;
+        let mut turned = knob.turned(settings, 1.0);
+        if turned == settings {
+            sign = -1.0;
+            turned = knob.turned(settings, -1.0);
+        }
+        let other = self.world(&turned, run).ok()?;
+        let mut forecast = Forecast::compared(&other, world).ok()?;
+        let mut change = column(&mut forecast, settings[knob.setting].spec.stage, trace);
+        change.iter_mut().for_each(|c| *c *= sign);
+        Some(change)
+    }
+}

@@ -1,0 +1,280 @@
+//! An extended Kalman filter over the pose, driven by the logged commands, with the camera's positions and all eight
+//! readings as measurements, one number after the other.
+
+use sim::{Forecast, Look, Outlook, Pose, PoseMatrix, Vec2, WheelSpeeds, World};
+
+use super::moments::cut;
+use super::rows::{LogRow, start_pose};
+
+/// Numbers measured in a control step: camera x and y, then the eight readings.
+pub(crate) const MEASURED: usize = 10;
+
+/// Which of the numbers of a control step count, bit by bit.
+pub(crate) type Used = u16;
+
+/// What the filter did in one control step: enough to follow a small change of the model through it.
+#[derive(Debug, Clone)]
+pub(crate) struct Instant {
+    pub(crate) time_s: f64,
+    pub(crate) used: Used,
+    /// Pose before the camera's position.
+    pub(crate) seen_from: Pose,
+    /// What the camera should have seen there.
+    pub(crate) seen: Vec2,
+    /// Pose and covariance at which the readings were expected.
+    pub(crate) sensed_from: Pose,
+    pub(crate) covariance: PoseMatrix,
+    /// Expected readings before and after the cut, and the standard deviation that they were cut with.
+    pub(crate) uncut: [f64; 8],
+    pub(crate) expected: [f64; 8],
+    pub(crate) deviation: [f64; 8],
+    pub(crate) look: Look,
+    /// Whitened innovations and what they were multiplied by.
+    pub(crate) innovation: [f64; MEASURED],
+    pub(crate) per_scale: [f64; MEASURED],
+    pub(crate) slope: [[f64; 3]; MEASURED],
+    pub(crate) gain: [[f64; 3]; MEASURED],
+    /// Pose after all of them, the command and where it led.
+    pub(crate) moved_from: Pose,
+    pub(crate) command: WheelSpeeds,
+    pub(crate) moved_to: Pose,
+    pub(crate) turned: Vec2,
+}
+
+/// One stretch filtered.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Trace {
+    pub(crate) instants: Vec<Instant>,
+    /// Sum over the used numbers of -(innovation^2 + log variance) / 2.
+    pub(crate) log_likelihood: f64,
+    pub(crate) count: usize,
+}
+
+/// The state of the filter.
+#[derive(Debug, Clone)]
+struct State {
+    pose: Pose,
+    covariance: PoseMatrix,
+}
+
+impl State {
+    /// One measured number: its whitened innovation, scale and gain.
+    #[inline]
+    fn update(&mut self, innovation: f64, slope: [f64; 3], noise_variance: f64) -> (f64, f64, [f64; 3]) {
+        let p = &mut self.covariance;
+        let across: [f64; 3] = std::array::from_fn(|i| p[i][0] * slope[0] + p[i][1] * slope[1] + p[i][2] * slope[2]);
+        let variance = slope[0] * across[0] + slope[1] * across[1] + slope[2] * across[2] + noise_variance;
+        let gain = across.map(|a| a / variance);
+        for i in 0..3 {
+            for j in 0..3 {
+                p[i][j] -= gain[i] * across[j];
+            }
+        }
+        self.shift(gain.map(|g| g * innovation));
+        (innovation / variance.sqrt(), 1.0 / variance.sqrt(), gain)
+    }
+
+    fn shift(&mut self, by: [f64; 3]) {
+        self.pose.position += Vec2::new(by[0], by[1]);
+        let turn = Vec2::new(by[2].cos(), by[2].sin());
+        self.pose.heading = Vec2::new(
+            self.pose.heading.x * turn.x - self.pose.heading.y * turn.y,
+            self.pose.heading.x * turn.y + self.pose.heading.y * turn.x,
+        );
+    }
+}
+
+/// Difference of two poses as x, y and heading.
+#[inline]
+pub(crate) fn difference(a: Pose, b: Pose) -> [f64; 3] {
+    let way = a.position - b.position;
+    [way.x, way.y, b.heading.perp_dot(a.heading).atan2(b.heading.dot(a.heading))]
+}
+
+/// F P F^T for a displacement that turns with the heading.
+#[inline]
+fn carried(p: &PoseMatrix, turned: Vec2) -> PoseMatrix {
+    let arm = [-turned.y, turned.x, 0.0];
+    let half: PoseMatrix = std::array::from_fn(|i| std::array::from_fn(|j| p[i][j] + arm[i] * p[2][j]));
+    std::array::from_fn(|i| std::array::from_fn(|j| half[i][j] + half[i][2] * arm[j]))
+}
+
+/// Control steps at the beginning that do not count: the start pose was fitted to them.
+const BURN_IN: usize = 48;
+
+/// Filters one stretch. `used` says for each row what counts; without it all that is there does.
+pub(crate) fn filter(world: &World<'_>, rows: &[LogRow], used: Option<&[Used]>) -> Option<Trace> {
+    let mut forecast = Forecast::new(world).ok()?;
+    let start = start_pose(rows, &forecast.machine().robot, world.rules())?;
+    let mut covariance = [[0.0; 3]; 3];
+    (covariance[0][0], covariance[1][1], covariance[2][2]) = (4e-6, 4e-6, 2.5e-3);
+    let mut state = State { pose: start, covariance };
+    let mut trace = Trace { instants: Vec::with_capacity(rows.len()), ..Trace::default() };
+    for (i, row) in rows.iter().enumerate() {
+        forecast.tick(row.time_s);
+        let usable = match used {
+            Some(used) => used[i],
+            None => available(row, i),
+        };
+        let instant = step(&mut forecast, &mut state, row, usable, i >= BURN_IN);
+        for m in (0..MEASURED).filter(|m| instant.used >> m & 1 == 1) {
+            let e = instant.innovation[m];
+            trace.log_likelihood -= 0.5 * e * e - instant.per_scale[m].ln();
+            trace.count += 1;
+        }
+        trace.instants.push(instant);
+        if !state.pose.position.x.is_finite() {
+            return None;
+        }
+    }
+    Some(trace)
+}
+
+/// What a row has; readings do not guide the very first steps, where the heading is a guess.
+fn available(row: &LogRow, index: usize) -> Used {
+    let camera = if row.observed.is_some() { 0b11 } else { 0 };
+    let readings = if row.read().is_some() && index >= BURN_IN / 3 { 0b11_1111_1100 } else { 0 };
+    camera | readings
+}
+
+/// One control step.
+fn step(forecast: &mut Forecast<'_>, state: &mut State, row: &LogRow, usable: Used, counts: bool) -> Instant {
+    let mut instant = Instant {
+        time_s: row.time_s,
+        used: if counts { usable } else { 0 },
+        seen_from: state.pose,
+        seen: forecast.observed(state.pose),
+        sensed_from: state.pose,
+        covariance: state.covariance,
+        uncut: [0.0; 8],
+        expected: [0.0; 8],
+        deviation: [1.0; 8],
+        look: Look::default(),
+        innovation: [0.0; MEASURED],
+        per_scale: [1.0; MEASURED],
+        slope: [[0.0; 3]; MEASURED],
+        gain: [[0.0; 3]; MEASURED],
+        moved_from: state.pose,
+        command: row.command,
+        moved_to: state.pose,
+        turned: Vec2::ZERO,
+    };
+    see(forecast, state, row, usable, &mut instant);
+    instant.sensed_from = state.pose;
+    instant.covariance = state.covariance;
+    let outlook = forecast.readings(state.pose, &state.covariance);
+    sense(forecast, state, (row, &outlook), usable, &mut instant);
+    instant.moved_from = state.pose;
+    let motion = forecast.motion(state.pose, row.command);
+    let mut covariance = carried(&state.covariance, motion.turned);
+    for i in 0..3 {
+        for j in 0..3 {
+            covariance[i][j] += motion.covariance[i][j];
+        }
+    }
+    (instant.moved_to, instant.turned) = (motion.pose, motion.turned);
+    *state = State { pose: motion.pose, covariance };
+    instant
+}
+
+/// The camera's position.
+fn see(forecast: &Forecast<'_>, state: &mut State, row: &LogRow, usable: Used, instant: &mut Instant) {
+    let Some(observed) = row.observed.filter(|_| usable & 0b11 != 0) else { return };
+    // Positions are written to 0.1 mm.
+    const ROUNDING_M2: f64 = 1e-8 / 12.0;
+    let noise = forecast.machine().camera_noise_m.powi(2) + ROUNDING_M2;
+    let slopes = camera_slopes(forecast, instant.seen_from, instant.seen);
+    let missed = observed - instant.seen;
+    for (m, missed) in [missed.x, missed.y].into_iter().enumerate() {
+        let already = difference(state.pose, instant.seen_from);
+        let expected: f64 = (0..3).map(|axis| slopes[m][axis] * already[axis]).sum();
+        instant.slope[m] = slopes[m];
+        (instant.innovation[m], instant.per_scale[m], instant.gain[m]) = state.update(missed - expected, slopes[m], noise);
+    }
+}
+
+/// Change of the seen position with the pose.
+fn camera_slopes(forecast: &Forecast<'_>, pose: Pose, seen: Vec2) -> [[f64; 3]; 2] {
+    const H: f64 = 1e-5;
+    let mut slopes = [[0.0; 3]; 2];
+    for axis in 0..3 {
+        let mut moved = State { pose, covariance: [[0.0; 3]; 3] };
+        let mut by = [0.0; 3];
+        by[axis] = H;
+        moved.shift(by);
+        let change = (forecast.observed(moved.pose) - seen) / H;
+        (slopes[0][axis], slopes[1][axis]) = (change.x, change.y);
+    }
+    slopes
+}
+
+/// The eight readings.
+fn sense(
+    forecast: &Forecast<'_>,
+    state: &mut State,
+    (row, outlook): (&LogRow, &Outlook),
+    usable: Used,
+    instant: &mut Instant,
+) {
+    (instant.look, instant.uncut) = (outlook.look, outlook.mean);
+    let noise = forecast.machine().noise;
+    for lane in 0..8 {
+        let m = lane + 2;
+        let slope = outlook.slope[lane];
+        let p = &state.covariance;
+        // The variance before the cut holds the pose's share at this moment of the sequence.
+        let pose_variance: f64 =
+            (0..3).map(|i| slope[i] * (p[i][0] * slope[0] + p[i][1] * slope[1] + p[i][2] * slope[2])).sum();
+        let own_variance = noise.deviation(outlook.mean[lane]).powi(2) + outlook.edge_variance[lane];
+        let deviation = (own_variance + pose_variance).sqrt();
+        let read = cut(outlook.mean[lane], deviation);
+        (instant.expected[lane], instant.deviation[lane]) = (read.mean, deviation);
+        if usable >> m & 1 == 0 {
+            continue;
+        }
+        let slope = slope.map(|s| s * read.open);
+        let already = difference(state.pose, instant.sensed_from);
+        let expected: f64 = read.mean + (0..3).map(|axis| slope[axis] * already[axis]).sum::<f64>();
+        let rest = (read.variance - pose_variance * read.open * read.open).max(1e-3 * read.variance);
+        instant.slope[m] = slope;
+        (instant.innovation[m], instant.per_scale[m], instant.gain[m]) =
+            state.update(row.readings[lane] - expected, slope, rest);
+    }
+}
+
+/// Which readings the poses of a trace let count: those whose ray is neither near the end of the range nor near the
+/// silhouette of a wall. Decided once, so that every model is judged on the same numbers.
+pub(crate) fn clear_readings(world: &World<'_>, trace: &Trace, rows: &[LogRow]) -> Vec<Used> {
+    let Ok(mut forecast) = Forecast::new(world) else { return vec![0; rows.len()] };
+    let range_m = forecast.machine().range_m;
+    let still = [[0.0; 3]; 3];
+    (trace.instants.iter().zip(rows).enumerate())
+        .map(|(i, (instant, row))| {
+            let mut used = available(row, i);
+            let turned = |by: f64| {
+                let mut state = State { pose: instant.moved_from, covariance: still };
+                state.shift([0.0, 0.0, by]);
+                state.pose
+            };
+            let sides = [-SILHOUETTE_RAD, SILHOUETTE_RAD].map(|by| forecast.readings(turned(by), &still).look.distance_m);
+            for lane in 0..8 {
+                let at = instant.look.distance_m[lane];
+                let edge = (at - range_m).abs() < EDGE_M + 2.0 * instant.look.deviation_m[lane];
+                let leap = sides.iter().any(|side| leaps(at, side[lane], range_m));
+                if edge || leap {
+                    used &= !(1 << (lane + 2));
+                }
+            }
+            used
+        })
+        .collect()
+}
+
+const SILHOUETTE_RAD: f64 = 0.06;
+const EDGE_M: f64 = 0.002;
+
+/// Whether a small turn makes a ray jump from one wall to another, or to none, within the range.
+fn leaps(at: f64, beside: f64, range_m: f64) -> bool {
+    let (at, beside) = (at.min(1.2 * range_m), beside.min(1.2 * range_m));
+    at.min(beside) < range_m && (at - beside).abs() > 0.012 + 0.15 * at.min(beside)
+}

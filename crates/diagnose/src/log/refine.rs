@@ -1,0 +1,128 @@
+//! The values of a candidate that explain the logs best.
+
+use nalgebra::{DMatrix, DVector};
+use sim::{Pattern, Setting};
+
+use super::catalogue::{Shape, Variant};
+use super::evidence::{Assessment, Evidence, Knob};
+use super::screen::solve;
+
+/// A candidate with its best values.
+#[derive(Debug, Clone)]
+pub(crate) struct Fitted {
+    pub(crate) settings: Vec<Setting>,
+    pub(crate) knobs: Vec<Knob>,
+    pub(crate) log_likelihood: f64,
+    /// By stretch.
+    pub(crate) by_stretch: Vec<f64>,
+    /// Standard error of each knob's value.
+    pub(crate) standard_errors: Vec<f64>,
+    pub(crate) last: Option<Assessment>,
+}
+
+/// The knobs of one setting of a variant.
+pub(crate) fn knobs(variant: &Variant, setting: usize, pattern: &Pattern) -> Vec<Knob> {
+    let step = |value: usize| {
+        let param = &variant.spec.params[value];
+        let along = variant.sizes.iter().position(|&size| size == value && variant.shape != Shape::Scan);
+        match (along, param.name) {
+            (Some(i), _) => variant.steps[i],
+            (None, "azimuth_rad") => 0.02,
+            (None, "position") => 0.002,
+            (None, "length_m") => 0.003,
+            _ => 0.02 * variant.values[value].abs().max(1e-3),
+        }
+    };
+    let flat = variant.free.iter().map(|&value| Knob { setting, value, slope: false, step: step(value) });
+    if matches!(pattern, Pattern::ByTime { .. }) {
+        // A step that changes as much by the middle of a run of a few minutes.
+        let slopes = variant.free.iter().map(|&value| Knob { setting, value, slope: true, step: step(value) / 200.0 });
+        return flat.chain(slopes).collect();
+    }
+    flat.collect()
+}
+
+/// Whether an effect's derivative says nothing about its size: it jumps.
+pub(crate) fn jumps(setting: &Setting) -> bool {
+    matches!(setting.spec.name, "command-delay" | "speed-step" | "dead-band")
+}
+
+/// Gauss and Newton's method on the whitened innovations; a step counts only if the log-likelihood rises.
+pub(crate) fn refine(evidence: &Evidence<'_>, settings: Vec<Setting>, knobs: Vec<Knob>, steps: usize) -> Option<Fitted> {
+    let mut settings = settings;
+    let mut now = evidence.assess(&settings, &knobs)?;
+    for _ in 0..steps {
+        let (left, right) = pooled(&now, knobs.len());
+        let solution = solve(&left, &right);
+        if !(solution.gain > 0.02) {
+            break;
+        }
+        let mut accepted = None;
+        for share in [1.0, 0.3, 0.08] {
+            let mut trial = settings.clone();
+            for (knob, multiple) in knobs.iter().zip(solution.multiples.iter()) {
+                trial = knob.turned(&trial, share * multiple);
+            }
+            if let Some(then) = evidence.assess(&trial, &knobs).filter(|then| then.total() > now.total()) {
+                accepted = Some((trial, then));
+                break;
+            }
+        }
+        let Some((trial, then)) = accepted else { break };
+        let small = then.total() - now.total() < 0.01;
+        (settings, now) = (trial, then);
+        if small {
+            break;
+        }
+    }
+    Some(fitted(settings, knobs, now))
+}
+
+fn fitted(settings: Vec<Setting>, knobs: Vec<Knob>, now: Assessment) -> Fitted {
+    let (left, _) = pooled(&now, knobs.len());
+    let covariance = left.clone().cholesky().map(|factor| factor.inverse());
+    let error = |i: usize| covariance.as_ref().map_or(f64::INFINITY, |c| c[(i, i)].sqrt() * knobs[i].step);
+    Fitted {
+        standard_errors: (0..knobs.len()).map(error).collect(),
+        log_likelihood: now.total(),
+        by_stretch: now.log_likelihood.clone(),
+        settings,
+        knobs,
+        last: Some(now),
+    }
+}
+
+/// The normal equations of all stretches together.
+pub(crate) fn pooled(assessment: &Assessment, count: usize) -> (DMatrix<f64>, DVector<f64>) {
+    assessment.normals.iter().fold((DMatrix::zeros(count, count), DVector::zeros(count)), |(left, right), normal| {
+        (left + &normal.left, right + &normal.right)
+    })
+}
+
+/// The best size of an effect that jumps: trial sizes about `start`, then ever closer ones.
+pub(crate) fn hunt(evidence: &Evidence<'_>, setting: &Setting, spread: f64) -> Option<Fitted> {
+    let at = |size: f64| {
+        let settings = vec![Setting::constant(setting.spec, [size])];
+        evidence.assess(&settings, &[]).map(|found| (size, found))
+    };
+    let (Pattern::Constant(values), param) = (&setting.pattern, &setting.spec.params[0]) else { return None };
+    let mut best = at(values[0])?;
+    let mut spread = spread;
+    for _ in 0..rounds(setting) {
+        for side in [-1.0, -0.5, 0.5, 1.0] {
+            let size = (best.0.min(values[0] * 4.0) + side * spread).clamp(param.low, param.high);
+            if let Some(found) = at(size).filter(|found| found.1.total() > best.1.total()) {
+                best = found;
+            }
+        }
+        spread *= 0.4;
+    }
+    let mut fitted = fitted(vec![Setting::constant(setting.spec, [best.0])], Vec::new(), best.1);
+    fitted.knobs = vec![Knob { setting: 0, value: 0, slope: false, step: spread }];
+    fitted.standard_errors = vec![spread.max(0.004 * best.0)];
+    Some(fitted)
+}
+
+fn rounds(setting: &Setting) -> usize {
+    if setting.spec.name == "command-delay" { 2 } else { 4 }
+}

@@ -1,0 +1,140 @@
+use track::Vec2;
+
+use super::super::testing::{active, declared, moment, scene, silent, steps, with};
+use super::super::{EFFECTS, Setting, UNLISTED, find};
+use crate::{Error, Pose, WheelSpeeds};
+
+/// Value of a word of one of the three choices.
+fn choice(param: usize, word: &str) -> f64 {
+    UNLISTED.params[param]
+        .choices
+        .iter()
+        .position(|name| *name == word)
+        .unwrap() as f64
+}
+
+fn values(words: [&str; 3], coefficients: &[f64]) -> Vec<f64> {
+    let words = words.iter().enumerate().map(|(i, word)| choice(i, word));
+    words.chain(coefficients.iter().copied()).collect()
+}
+
+#[test]
+fn it_is_known_but_no_candidate() {
+    assert_eq!(find("unlisted").unwrap().name, "unlisted");
+    assert!(EFFECTS.iter().all(|spec| spec.name != "unlisted"));
+    let check = |values: Vec<f64>| Setting::constant(&UNLISTED, values).check(0);
+    assert!(check(values(["reading", "time", "polynomial"], &[0.1; 9])).is_ok());
+    assert!(check(vec![9.0, 0.0, 0.0]).is_err() && check(vec![0.0]).is_err());
+    let broken = check(values(["reading", "time", "polynomial"], &[0.0, f64::NAN])).unwrap_err();
+    assert!(matches!(broken, Error::OutOfRange { key, .. } if key == "effect.0.coefficients"));
+}
+
+#[test]
+fn wheel_speed_by_the_heading_twice_per_turn() {
+    let mut wheels = active(
+        "unlisted",
+        &values(["wheel speed", "heading", "harmonics"], &[0.0, 0.0, 0.06, 0.03]),
+    );
+    for heading_rad in [-3.0, -1.0, 0.0, 0.5, 2.0_f64] {
+        let now = moment(Pose::new(0.0, 0.0, heading_rad), 0.0, 0.032);
+        let ground = wheels.effect.ground(
+            &wheels.values,
+            &now,
+            WheelSpeeds {
+                left_m_s: 0.05,
+                right_m_s: 0.02,
+            },
+        );
+        let factor = 1.0 + 0.06 * (2.0 * heading_rad).cos() + 0.03 * (2.0 * heading_rad).sin();
+        assert!(
+            (ground.left_m_s - 0.05 * factor).abs() < 1e-15
+                && (ground.right_m_s - 0.02 * factor).abs() < 1e-15
+        );
+    }
+}
+
+#[test]
+fn camera_polynomial_over_the_floor() {
+    let camera = active(
+        "unlisted",
+        &values(
+            ["camera y", "place", "polynomial"],
+            &[1.0, 2.0, 3.0, 4.0, 5.0, 6.0],
+        ),
+    );
+    let (pose, p) = (Pose::new(0.9, 0.7, 0.0), Vec2::new(0.9, 0.7));
+    let seen = camera
+        .effect
+        .observed(&camera.values, &moment(pose, 0.0, 0.064), p);
+    let (x, y) = (0.2, 0.1);
+    let expected = 0.7 + 1.0 + 2.0 * x + 3.0 * y + 4.0 * x * x + 5.0 * x * y + 6.0 * y * y;
+    assert!((seen - Vec2::new(0.9, expected)).length() < 1e-12, "{seen:?}");
+}
+
+#[test]
+fn polynomial_of_time_and_harmonics_of_the_gate() {
+    let of = |words, coefficients: &[f64]| {
+        let yaw = active("unlisted", &values(words, coefficients));
+        let now = moment(Pose::new(0.0, 0.0, 0.0), 10.0, 0.032); // next is gate 25 of 100: a quarter of a turn
+        yaw.effect.drift_m_s(&yaw.values, &now)
+    };
+    assert_eq!(
+        of(["side slip", "time", "polynomial"], &[1.0, 2.0, 3.0]),
+        Vec2::new(0.0, 321.0)
+    );
+    let quarter = of(["side slip", "gate", "harmonics"], &[7.0, 0.5]);
+    assert!((quarter - Vec2::new(0.0, 0.5)).length() < 1e-14, "{quarter:?}");
+    assert_eq!(
+        of(["yaw rate", "constant", "polynomial"], &[1.0]),
+        Vec2::ZERO,
+        "it acts on nothing else"
+    );
+}
+
+/// Constant shares on both wheels are the wheel scale, a constant share on the readings their gain.
+#[test]
+fn constants_are_the_listed_effects() {
+    let same = |words: [&str; 3], share: f64, name: &str, value: f64| {
+        let unlisted = steps(&with(&silent(), "unlisted", &values(words, &[share])), 0, 1, 200);
+        assert_eq!(
+            unlisted,
+            steps(&with(&silent(), name, &[value]), 0, 1, 200),
+            "{name}"
+        );
+    };
+    same(
+        ["wheel speed", "constant", "polynomial"],
+        0.25,
+        "wheel-scale",
+        1.25,
+    );
+    same(
+        ["left wheel", "constant", "polynomial"],
+        0.25,
+        "wheel-asymmetry",
+        1.25,
+    );
+    same(["reading", "constant", "harmonics"], 0.25, "reading-gain", 1.25);
+}
+
+#[test]
+fn no_coefficients_change_nothing() {
+    let plain = steps(&declared(), 0, 1, 100);
+    assert_eq!(scene().walls().len(), 47);
+    for target in UNLISTED.params[0].choices {
+        for zeros in [&[] as &[f64], &[0.0; 4]] {
+            let model = with(
+                &declared(),
+                "unlisted",
+                &values([target, "heading", "harmonics"], zeros),
+            );
+            assert!(steps(&model, 0, 1, 100) == plain, "{target}");
+            let model = with(
+                &declared(),
+                "unlisted",
+                &values([target, "turn", "polynomial"], zeros),
+            );
+            assert!(steps(&model, 0, 1, 100) == plain, "{target}");
+        }
+    }
+}

@@ -1,0 +1,136 @@
+//! A cause without a name: what it acts on, what it depends on, and the coefficients of that dependence.
+
+use track::Vec2;
+
+use super::{Effect, Moment, Param, Spec, Stage};
+use crate::{Machine, Readings, Twist, WheelSpeeds};
+
+const ACTS_ON: [&str; 9] = [
+    "yaw rate",
+    "wheel speed",
+    "left wheel",
+    "right wheel",
+    "side slip",
+    "reading",
+    "left-right difference",
+    "camera x",
+    "camera y",
+];
+const DEPENDS_ON: [&str; 7] = ["constant", "heading", "gate", "place", "speed", "turn", "time"];
+const BASES: [&str; 2] = ["polynomial", "harmonics"];
+
+/// Values before the coefficients.
+const WORDS: usize = 3;
+
+/// An effect outside the list: a sum over basis functions of one variable.
+///
+/// What the sum is: rad/s added to the yaw rate; m/s added to the robot's velocity to its left; a share added to
+/// wheel speeds or to all readings; counts added to the difference of the left and the right three readings that
+/// controllers look at; m added to what the camera sees.
+///
+/// The variable u is 1 (constant), the heading (rad), the lap's fraction by gates times 2 pi (rad), the mean of the
+/// commanded wheel speeds or their difference, right less left (m/s), or the time since the run began (s). The
+/// polynomial is c0 + c1 u + c2 u^2 + ..., the harmonics c0 cos u + c1 sin u + c2 cos 2u + c3 sin 2u + .... A place on
+/// the floor has two coordinates (x, y) from the arena's middle (m), and for it either basis stands for the monomials 1, x, y,
+/// x^2, xy, y^2, ....
+///
+/// It is not in [`super::EFFECTS`], because it is no candidate by itself; [`super::find`] knows it.
+pub static UNLISTED: Spec = Spec {
+    name: "unlisted",
+    stage: Stage::Act,
+    summary: "an effect without a name: coefficients of basis functions of what it depends on",
+    params: &[
+        Param::choice("acts_on", &ACTS_ON),
+        Param::choice("depends_on", &DEPENDS_ON),
+        Param::choice("basis", &BASES),
+    ],
+    list: Some(Param::new("coefficients", "", 0.0, -1e6, 1e6)),
+    build: || Box::new(Unlisted),
+};
+
+#[derive(Debug)]
+struct Unlisted;
+
+/// The word that a value of a choice stands for.
+fn word(names: &'static [&'static str], value: f64) -> &'static str {
+    names.get(value as usize).copied().unwrap_or_default()
+}
+
+/// The sum over the basis, if the effect acts on one of the targets.
+fn amount(values: &[f64], now: &Moment, targets: &[&str]) -> Option<f64> {
+    if !targets.contains(&word(&ACTS_ON, values[0])) {
+        return None;
+    }
+    let (coefficients, command) = (&values[WORDS..], now.command);
+    let u = match word(&DEPENDS_ON, values[1]) {
+        "place" => return Some(on_floor(coefficients, now.pose.position - now.arena_middle)),
+        "heading" => now.pose.heading_rad(),
+        "gate" => std::f64::consts::TAU * now.gate as f64 / now.gate_count as f64,
+        "speed" => 0.5 * (command.left_m_s + command.right_m_s),
+        "turn" => command.right_m_s - command.left_m_s,
+        "time" => now.time_s,
+        _ => return Some(coefficients.iter().sum()),
+    };
+    Some(match word(&BASES, values[2]) {
+        "harmonics" => harmonics(coefficients, u),
+        _ => coefficients.iter().rev().fold(0.0, |sum, c| sum * u + c),
+    })
+}
+
+fn harmonics(coefficients: &[f64], u: f64) -> f64 {
+    let term = |(k, pair): (usize, &[f64])| {
+        let (sin, cos) = ((k + 1) as f64 * u).sin_cos();
+        pair[0] * cos + pair.get(1).map_or(0.0, |c| c * sin)
+    };
+    coefficients.chunks(2).enumerate().map(term).sum()
+}
+
+/// Monomials by rising degree, and in each degree by falling power of x.
+fn on_floor(coefficients: &[f64], at: Vec2) -> f64 {
+    let powers = (0..).flat_map(|degree: i32| (0..=degree).map(move |y| (degree - y, y)));
+    coefficients
+        .iter()
+        .zip(powers)
+        .map(|(c, (i, j))| c * at.x.powi(i) * at.y.powi(j))
+        .sum()
+}
+
+impl Effect for Unlisted {
+    fn readings(&mut self, values: &[f64], now: &Moment, _machine: &Machine, readings: &mut Readings) {
+        if let Some(share) = amount(values, now, &["reading"]) {
+            readings.iter_mut().for_each(|reading| *reading *= 1.0 + share);
+        }
+        if let Some(counts) = amount(values, now, &["left-right difference"]) {
+            for (left, right) in [(5, 2), (6, 1), (7, 0)] {
+                readings[left] += counts / 6.0;
+                readings[right] -= counts / 6.0;
+            }
+        }
+    }
+
+    fn ground(&mut self, values: &[f64], now: &Moment, wheels: WheelSpeeds) -> WheelSpeeds {
+        let factor = |wheel| 1.0 + amount(values, now, &["wheel speed", wheel]).unwrap_or(0.0);
+        WheelSpeeds {
+            left_m_s: wheels.left_m_s * factor("left wheel"),
+            right_m_s: wheels.right_m_s * factor("right wheel"),
+        }
+    }
+
+    fn twist(&mut self, values: &[f64], now: &Moment, twist: Twist) -> Twist {
+        let more_rad_s = amount(values, now, &["yaw rate"]).unwrap_or(0.0);
+        Twist {
+            yaw_rad_s: twist.yaw_rad_s + more_rad_s,
+            ..twist
+        }
+    }
+
+    fn drift_m_s(&self, values: &[f64], now: &Moment) -> Vec2 {
+        let left_m_s = amount(values, now, &["side slip"]).unwrap_or(0.0);
+        now.pose.heading.perp() * left_m_s
+    }
+
+    fn observed(&self, values: &[f64], now: &Moment, position: Vec2) -> Vec2 {
+        let along = |axis| amount(values, now, &[axis]).unwrap_or(0.0);
+        position + Vec2::new(along("camera x"), along("camera y"))
+    }
+}

@@ -1,0 +1,315 @@
+//! The tick without noise at poses that are given: what a filter needs to follow a robot from its log.
+
+use std::sync::Arc;
+
+use track::Vec2;
+
+use crate::cast::LANES;
+use crate::effects::{Active, Moment, Stage};
+use crate::outlook::{Look, Outlook, See};
+use crate::run::{Sight, sights};
+use crate::world::{Geometry, World, altered};
+use crate::{Error, Machine, Pose, Readings, Setting, WheelSpeeds};
+
+/// A 3 x 3 matrix over x (m), y (m) and heading (rad), row by row.
+pub type PoseMatrix = [[f64; 3]; 3];
+
+/// Where a control step leads.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Motion {
+    /// The pose after it.
+    pub pose: Pose,
+    /// The part of the displacement that turns with the heading, m.
+    pub turned: Vec2,
+    /// Covariance that slip adds to x, y and heading.
+    pub covariance: PoseMatrix,
+}
+
+/// One run's machine without noise. What remembers (lags, delays) does so from call to call, so each of
+/// [`Forecast::readings`] and [`Forecast::motion`] is called once per control step, in order, after [`Forecast::tick`].
+#[derive(Debug)]
+pub struct Forecast<'w> {
+    world: &'w World<'w>,
+    geometry: Arc<Geometry>,
+    machine: Machine,
+    sights: Vec<Sight>,
+    effects: Vec<Active>,
+    /// Effects whose displacement of the walls is not in the geometry.
+    displacing: Vec<Active>,
+    drifting: bool,
+    weighs_rays: bool,
+    /// Whether rays go otherwise than in the world without the further effects, and whether they answer otherwise.
+    recasts: bool,
+    responds: bool,
+    /// What comes through of a small change of the readings; `None` for all of it.
+    through: Option<[[f64; LANES]; LANES]>,
+    now: Moment,
+    ticks: u64,
+}
+
+impl<'w> Forecast<'w> {
+    /// The machine of a world at the run's start.
+    ///
+    /// # Errors
+    /// An effect without values for this run.
+    pub fn new(world: &'w World<'w>) -> Result<Self, Error> {
+        let mut forecast = Self::beside(world, &[])?;
+        forecast.through = forecast.passage()?;
+        Ok(forecast)
+    }
+
+    /// The machine of a world with further effects, whose displacements of the walls count to first order; to be
+    /// compared with the world without them ([`Forecast::readings_beside`]).
+    ///
+    /// # Errors
+    /// A further effect out of range, an effect without values for this run.
+    pub fn beside(world: &'w World<'w>, further: &[Setting]) -> Result<Self, Error> {
+        further.iter().enumerate().try_for_each(|(i, setting)| setting.check(i))?;
+        let settings: Vec<Setting> = world.model.effects.iter().chain(further).cloned().collect();
+        let effects = Active::all(&settings, world.run)?;
+        let moving: Vec<Setting> = further.iter().filter(|s| s.spec.stage == Stage::World).cloned().collect();
+        let machine = altered(&world.model.machine, &effects);
+        let mut forecast = Self {
+            world,
+            geometry: Arc::clone(&world.geometry),
+            sights: sights(&machine),
+            recasts: false,
+            responds: false,
+            displacing: Active::all(&moving, world.run)?,
+            machine,
+            drifting: effects.iter().any(Active::drifts),
+            weighs_rays: effects.iter().any(|active| active.effect.weighs_rays()),
+            effects,
+            through: None,
+            now: Moment {
+                time_s: 0.0,
+                step_s: world.rules().control_step_s,
+                pose: Pose::new(0.0, 0.0, 0.0),
+                command: WheelSpeeds::default(),
+                gate: 0,
+                gate_count: world.circuit().gates.len(),
+                arena_middle: world.arena_middle(),
+            },
+            ticks: 0,
+        };
+        forecast.compare(world)?;
+        Ok(forecast)
+    }
+
+    /// The machine of one world, to be compared with another one's ([`Forecast::readings_beside`]).
+    ///
+    /// # Errors
+    /// An effect without values for this run.
+    pub fn compared(world: &'w World<'w>, other: &World<'_>) -> Result<Self, Error> {
+        let mut forecast = Self::beside(world, &[])?;
+        forecast.compare(other)?;
+        Ok(forecast)
+    }
+
+    /// Notes in what the readings differ from another world's.
+    fn compare(&mut self, other: &World<'_>) -> Result<(), Error> {
+        let weighs = |active: &Active| active.effect.weighs_rays();
+        let others = Active::all(&other.model.effects, other.run)?;
+        let (mine, theirs) = (&self.machine, &other.machine);
+        self.recasts = self.drifting
+            || !Arc::ptr_eq(&self.geometry, &other.geometry)
+            || mine.mounts != theirs.mounts
+            || mine.beam != theirs.beam
+            || mine.beam.rays().len() > 1;
+        self.responds = self.weighs_rays
+            || others.iter().any(weighs)
+            || !self.displacing.is_empty()
+            || mine.range_m != theirs.range_m
+            || mine.response != theirs.response;
+        Ok(())
+    }
+
+    /// The machine's constants as they are now.
+    pub fn machine(&self) -> &Machine {
+        &self.machine
+    }
+
+    /// Goes to the control step that begins at `time_s`, seconds since the run began.
+    pub fn tick(&mut self, time_s: f64) {
+        self.now.time_s = time_s;
+        if self.drifting {
+            self.effects.iter_mut().chain(&mut self.displacing).for_each(|active| active.advance(time_s));
+            self.machine = altered(&self.world.model.machine, &self.effects);
+            self.sights = sights(&self.machine);
+            // As seldom as a run does it.
+            const TICKS_BETWEEN_CUTS: u64 = 64;
+            if self.ticks.is_multiple_of(TICKS_BETWEEN_CUTS) {
+                self.geometry = self.world.scene.geometry(&self.effects, &self.machine);
+            }
+        }
+        self.ticks += 1;
+    }
+
+    /// Where the camera sees a pose, before its noise, m.
+    pub fn observed(&self, pose: Pose) -> Vec2 {
+        let now = Moment { pose, ..self.now };
+        let see = |position, active: &Active| active.effect.observed(&active.values, &now, position);
+        self.effects.iter().fold(pose.position, see)
+    }
+
+    /// Expected readings at a pose with this covariance, to second order in the distance.
+    pub fn readings(&mut self, pose: Pose, covariance: &PoseMatrix) -> Outlook {
+        let mut outlook = self.see().outlook(pose, covariance);
+        self.change_readings(pose, &mut outlook.mean);
+        if let Some(through) = &self.through {
+            let slope = outlook.slope;
+            outlook.slope = through.map(|row| {
+                std::array::from_fn(|axis| (0..LANES).map(|lane| row[lane] * slope[lane][axis]).sum())
+            });
+            for lane in 0..LANES {
+                outlook.edge_variance[lane] *= through[lane][lane] * through[lane][lane];
+            }
+        }
+        outlook
+    }
+
+    /// Expected readings where the same world without further effects had this look: rays are cast again only where
+    /// the further effects turn them.
+    pub fn readings_beside(&mut self, pose: Pose, covariance: &PoseMatrix, look: &Look) -> Readings {
+        let mut readings = if self.recasts {
+            self.see().outlook(pose, covariance).mean
+        } else if self.responds {
+            self.see().responses_again(look)
+        } else {
+            look.response()
+        };
+        self.change_readings(pose, &mut readings);
+        readings
+    }
+
+    fn see(&self) -> See<'_> {
+        See {
+            scene: self.world.scene,
+            geometry: &self.geometry,
+            machine: &self.machine,
+            sights: &self.sights,
+            effects: &self.effects,
+            weighs_rays: self.weighs_rays,
+            displacing: &self.displacing,
+        }
+    }
+
+    /// What effects make of the readings.
+    fn change_readings(&mut self, pose: Pose, readings: &mut Readings) {
+        let now = Moment { pose, step_s: self.world.rules().control_step_s, ..self.now };
+        for active in &mut self.effects {
+            active.effect.readings(&active.values, &now, &self.machine, readings);
+        }
+    }
+
+    /// The motion of one control step without slip, and the covariance that slip adds.
+    pub fn motion(&mut self, pose: Pose, command: WheelSpeeds) -> Motion {
+        const MOST: usize = 8;
+        let mut pushes = [(pose, WheelSpeeds::default()); MOST];
+        let mut count = 0;
+        let (end, drifted) = self.roll(pose, command, |half, ground| {
+            pushes[count.min(MOST - 1)] = (half, ground);
+            count += 1;
+        });
+        // Beyond so many physics steps the last stands for all that follow.
+        let step_s = self.world.rules().control_step_s / count as f64;
+        let covariance = self.slip_covariance(&pushes[..count.min(MOST)], end.position, step_s);
+        Motion { pose: end, turned: end.position - pose.position - drifted, covariance }
+    }
+
+    /// Where one control step leads without slip.
+    pub fn lead(&mut self, pose: Pose, command: WheelSpeeds) -> Pose {
+        self.roll(pose, command, |_, _| ()).0
+    }
+
+    /// The physics steps of one control step: the pose after them and what drift added. `each` gets the middle of every
+    /// step and the speeds of the wheels.
+    #[inline]
+    fn roll(&mut self, pose: Pose, command: WheelSpeeds, mut each: impl FnMut(Pose, WheelSpeeds)) -> (Pose, Vec2) {
+        let rules = self.world.rules();
+        let step_s = rules.control_step_s / f64::from(rules.physics_steps);
+        let start_s = self.now.time_s;
+        let mut now = Moment { pose, command, step_s, ..self.now };
+        let (mut at, mut drifted) = (pose, Vec2::ZERO);
+        for k in 0..rules.physics_steps {
+            now.time_s = start_s + f64::from(k) * step_s;
+            now.pose = at;
+            let ground = self.ground(&now);
+            let mut twist = self.machine.robot.twist(ground);
+            for active in &mut self.effects {
+                twist = active.effect.twist(&active.values, &now, twist);
+            }
+            let next = at.advance(twist, step_s);
+            each(Pose { position: at.position.midpoint(next.position), heading: (at.heading + next.heading) * 0.5 }, ground);
+            let drift: Vec2 =
+                self.effects.iter().map(|active| active.effect.drift_m_s(&active.values, &now) * step_s).sum();
+            at = Pose { position: next.position + drift, ..next };
+            drifted += drift;
+        }
+        (at, drifted)
+    }
+
+    /// Speeds of the wheels over the ground without slip.
+    fn ground(&mut self, now: &Moment) -> WheelSpeeds {
+        let mut wheels = now.command;
+        for active in &mut self.effects {
+            wheels = active.effect.drive(&active.values, now, wheels);
+        }
+        for active in &mut self.effects {
+            wheels = active.effect.ground(&active.values, now, wheels);
+        }
+        wheels
+    }
+
+    /// What uniform slip of each wheel in each physics step adds up to at the step's end.
+    fn slip_covariance(&self, pushes: &[(Pose, WheelSpeeds)], end: Vec2, step_s: f64) -> PoseMatrix {
+        let level = self.machine.slip_level;
+        let mut covariance = [[0.0; 3]; 3];
+        for (half, ground) in pushes {
+            let arm = (end - half.position).perp();
+            for (speed_m_s, sign) in [(ground.left_m_s, -1.0), (ground.right_m_s, 1.0)] {
+                let yaw = sign * step_s / self.machine.robot.axle_m;
+                let way = half.heading * (0.5 * step_s) + arm * yaw;
+                let push = [way.x, way.y, yaw];
+                let variance = (level * speed_m_s).powi(2) / 3.0;
+                for i in 0..3 {
+                    for j in 0..3 {
+                        covariance[i][j] += variance * push[i] * push[j];
+                    }
+                }
+            }
+        }
+        covariance
+    }
+
+    /// What comes through of a small change of each reading: the effects on readings are straight lines in them, so
+    /// one difference from a second chain of effects, at its second reading, is exact.
+    fn passage(&self) -> Result<Option<[[f64; LANES]; LANES]>, Error> {
+        let second = |lane: Option<usize>| -> Result<Readings, Error> {
+            let mut effects = Active::all(&self.world.model.effects, self.world.run)?;
+            let mut readings = [100.0; LANES];
+            for step in 0..2 {
+                readings = [100.0; LANES];
+                if let (Some(lane), 1) = (lane, step) {
+                    readings[lane] += 1.0;
+                }
+                for active in &mut effects {
+                    active.effect.readings(&active.values, &self.now, &self.machine, &mut readings);
+                }
+            }
+            Ok(readings)
+        };
+        let plain = second(None)?;
+        let mut through = [[0.0; LANES]; LANES];
+        for lane in 0..LANES {
+            let raised = second(Some(lane))?;
+            for (row, (a, b)) in raised.iter().zip(plain).enumerate() {
+                through[row][lane] = a - b;
+            }
+        }
+        let unchanged = (0..LANES)
+            .all(|i| (0..LANES).all(|j| (through[i][j] - if i == j { 1.0 } else { 0.0 }).abs() < 1e-9));
+        Ok(if unchanged { None } else { Some(through) })
+    }
+}
+

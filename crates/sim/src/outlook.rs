@@ -1,0 +1,256 @@
+//! What the sensors should read at a pose that is known up to a covariance.
+
+use crate::cast::{Hits, LANES, Rays};
+use crate::effects::{Active, Hit};
+use crate::forecast::PoseMatrix;
+use crate::run::Sight;
+use crate::world::{Geometry, Scene};
+use crate::{Combine, Machine, Pose, Readings, Response};
+
+/// What the sensors should read at an uncertain pose, before noise and cut.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Outlook {
+    /// Expected readings, counts.
+    pub mean: Readings,
+    /// Change of each with x, y (counts/m) and heading (counts/rad).
+    pub slope: [[f64; 3]; LANES],
+    /// Variance of each that the pose's uncertainty makes beyond its slope, at the end of the range, counts^2.
+    pub edge_variance: Readings,
+    /// What the rays along the sensors' axes met.
+    pub look: Look,
+}
+
+/// What the rays along the sensors' axes met.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Look {
+    /// Distance, m; infinite where there is no wall.
+    pub distance_m: [f64; LANES],
+    /// Standard deviation of that distance, m.
+    pub deviation_m: [f64; LANES],
+    rays: Rays,
+    hits: Hits,
+    /// Responses before effects on readings, counts.
+    response: Readings,
+}
+
+/// All that one look at the walls needs.
+pub(crate) struct See<'a> {
+    pub(crate) scene: &'a Scene,
+    pub(crate) geometry: &'a Geometry,
+    pub(crate) machine: &'a Machine,
+    pub(crate) sights: &'a [Sight],
+    pub(crate) effects: &'a [Active],
+    pub(crate) weighs_rays: bool,
+    /// Effects whose displacement of the walls is not in the geometry.
+    pub(crate) displacing: &'a [Active],
+}
+
+/// One ray of one sensor: its distance, how that changes with the pose, its standard deviation, and what effects make
+/// of its response.
+#[derive(Clone, Copy)]
+struct Glance {
+    distance_m: f64,
+    slope: [f64; 3],
+    deviation_m: f64,
+    factor: f64,
+}
+
+impl See<'_> {
+    /// The responses of all sensors, before effects on readings.
+    pub(crate) fn outlook(&self, pose: Pose, covariance: &PoseMatrix) -> Outlook {
+        let mut outlook = Outlook {
+            mean: [0.0; LANES],
+            slope: [[0.0; 3]; LANES],
+            edge_variance: [0.0; LANES],
+            look: Look {
+                distance_m: [f64::INFINITY; LANES],
+                deviation_m: [0.0; LANES],
+                rays: self.sights[0].rays.placed(pose),
+                hits: Hits::NONE,
+                response: [0.0; LANES],
+            },
+        };
+        let middle = self.sights.len() / 2;
+        for (number, sight) in self.sights.iter().enumerate() {
+            let rays = sight.rays.placed(pose);
+            let hits = self.geometry.caster.cast(&self.geometry.walls, pose.position, &rays);
+            if number == middle {
+                (outlook.look.rays, outlook.look.hits, outlook.look.distance_m) = (rays, hits, hits.distance_m);
+            }
+            for lane in (0..LANES).filter(|&lane| hits.distance_m[lane].is_finite()) {
+                let slope = self.distance_slope(pose, &rays, &hits, lane);
+                let deviation_m = quadratic(covariance, slope).max(0.0).sqrt();
+                if number == middle {
+                    outlook.look.deviation_m[lane] = deviation_m;
+                }
+                let (distance_m, factor) = self.met(&rays, &hits, lane);
+                self.add_ray(&mut outlook, lane, sight.weight, Glance { distance_m, slope, deviation_m, factor });
+            }
+        }
+        if self.machine.beam.combine == Combine::Distances {
+            self.respond_to_mean_distance(&mut outlook);
+        }
+        outlook.look.response = outlook.mean;
+        outlook
+    }
+
+    /// The same responses from a look that one ray a sensor had before.
+    pub(crate) fn responses_again(&self, look: &Look) -> Readings {
+        std::array::from_fn(|lane| {
+            if !look.hits.distance_m[lane].is_finite() {
+                return 0.0;
+            }
+            let (distance_m, factor) = self.met(&look.rays, &look.hits, lane);
+            let (deviation_m, range_m) = (look.deviation_m[lane], self.machine.range_m);
+            let (value, _, bend) = bend(&self.machine.response, distance_m);
+            factor * curved(value, bend, deviation_m) * seen_within(range_m - distance_m, deviation_m).0
+        })
+    }
+
+    /// Distance along one ray after what displaces the walls to first order, and what effects make of its response.
+    #[inline]
+    fn met(&self, rays: &Rays, hits: &Hits, lane: usize) -> (f64, f64) {
+        let distance_m = hits.distance_m[lane];
+        if !self.weighs_rays && self.displacing.is_empty() {
+            return (distance_m, 1.0);
+        }
+        let (walls, segment) = (&self.geometry.walls, hits.segment[lane] as usize);
+        let direction = rays.direction(lane);
+        let towards = walls.normal(segment).dot(direction);
+        let place = walls.place(segment, rays.origin(lane) + direction * distance_m);
+        let hit = Hit {
+            sensor: lane,
+            distance_m,
+            cos_incidence: towards.abs().min(1.0),
+            site: self.scene.site(place),
+        };
+        let factor = self.effects.iter().map(|active| active.effect.ray_factor(&active.values, &hit)).product();
+        let moved_m: f64 =
+            self.displacing.iter().map(|active| active.effect.displacement_m(&active.values, &hit.site)).sum();
+        (distance_m + moved_m / not_grazing(towards), factor)
+    }
+
+    /// Adds one ray's share: of the reading, or of the shortfall from the range where a sensor averages distances.
+    #[inline]
+    fn add_ray(&self, outlook: &mut Outlook, lane: usize, weight: f64, glance: Glance) {
+        let Glance { distance_m, slope, deviation_m, factor } = glance;
+        let short_m = self.machine.range_m - distance_m;
+        if short_m < -4.0 * deviation_m {
+            return;
+        }
+        if self.machine.beam.combine == Combine::Distances {
+            outlook.mean[lane] += weight * short_m;
+            (0..3).for_each(|axis| outlook.slope[lane][axis] -= weight * slope[axis]);
+            return;
+        }
+        let (value, rise, bend) = bend(&self.machine.response, distance_m);
+        let (seen, edge) = seen_within(short_m, deviation_m);
+        let spread = seen * (1.0 - seen) - (edge * deviation_m).powi(2);
+        outlook.edge_variance[lane] += (weight * factor * value).powi(2) * spread.max(0.0);
+        outlook.mean[lane] += weight * factor * seen * curved(value, bend, deviation_m);
+        for axis in 0..3 {
+            outlook.slope[lane][axis] += weight * factor * (seen * rise - edge * value) * slope[axis];
+        }
+    }
+
+    /// From the mean shortfall of the distances to the response at the mean distance.
+    fn respond_to_mean_distance(&self, outlook: &mut Outlook) {
+        for lane in 0..LANES {
+            let short_m = outlook.mean[lane];
+            let (value, rise, _) = bend(&self.machine.response, self.machine.range_m - short_m);
+            let seen = if short_m > 1e-12 { 1.0 } else { 0.0 };
+            outlook.mean[lane] = seen * value;
+            outlook.slope[lane] = outlook.slope[lane].map(|slope| -seen * rise * slope);
+        }
+    }
+
+    /// Change of a ray's distance with x, y and heading, while it stays on its segment.
+    #[inline]
+    fn distance_slope(&self, pose: Pose, rays: &Rays, hits: &Hits, lane: usize) -> [f64; 3] {
+        let direction = rays.direction(lane);
+        let normal = self.geometry.walls.normal(hits.segment[lane] as usize);
+        let towards = not_grazing(normal.dot(direction));
+        let swept = (rays.origin(lane) - pose.position).perp() + direction.perp() * hits.distance_m[lane];
+        [-normal.x / towards, -normal.y / towards, -normal.dot(swept) / towards]
+    }
+}
+
+impl Default for Look {
+    /// No wall anywhere.
+    fn default() -> Self {
+        let rays = Rays::new([(track::Vec2::ZERO, track::Vec2::X); LANES]);
+        let distance_m = [f64::INFINITY; LANES];
+        Self { distance_m, deviation_m: [0.0; LANES], rays, hits: Hits::NONE, response: [0.0; LANES] }
+    }
+}
+
+impl Look {
+    /// Responses before effects on readings, counts.
+    pub(crate) fn response(&self) -> Readings {
+        self.response
+    }
+}
+
+/// A ray that grazes a wall has no useful slope.
+#[inline]
+fn not_grazing(towards: f64) -> f64 {
+    const GRAZING: f64 = 0.05;
+    if towards.abs() < GRAZING { GRAZING.copysign(towards) } else { towards }
+}
+
+/// Expectation of a response that bends, over the distance's uncertainty; where it bends more than a parabola can
+/// follow, no more than half of itself.
+#[inline]
+fn curved(value: f64, bend: f64, deviation_m: f64) -> f64 {
+    let most = 0.5 * value.abs();
+    value + (0.5 * bend * deviation_m * deviation_m).clamp(-most, most)
+}
+
+/// Probability that an uncertain distance is within the range, and its density there (1/m).
+#[inline]
+fn seen_within(short_m: f64, deviation_m: f64) -> (f64, f64) {
+    if short_m.abs() >= 4.0 * deviation_m {
+        return (if short_m >= 0.0 { 1.0 } else { 0.0 }, 0.0);
+    }
+    let z = short_m / deviation_m;
+    (normal_cdf(z), normal_pdf(z) / deviation_m)
+}
+
+/// s^T M s.
+#[inline]
+fn quadratic(m: &PoseMatrix, s: [f64; 3]) -> f64 {
+    (0..3).map(|i| s[i] * (m[i][0] * s[0] + m[i][1] * s[1] + m[i][2] * s[2])).sum()
+}
+
+/// A response at a distance with its first and second derivative.
+#[inline]
+fn bend(response: &Response, distance_m: f64) -> (f64, f64, f64) {
+    match *response {
+        Response::Improved { a_counts, d0_m, exponent } if distance_m > 0.0 => {
+            let power = (exponent * (distance_m / d0_m).ln()).exp();
+            let (value, share) = (a_counts / (1.0 + power), power / (1.0 + power));
+            let rate = exponent / distance_m;
+            let bend = rate / distance_m * value * share * (1.0 + exponent * (2.0 * share - 1.0));
+            (value, -rate * value * share, bend)
+        }
+        _ => {
+            const H_M: f64 = 1e-4;
+            let [low, middle, high] = [-H_M, 0.0, H_M].map(|h| response.reading((distance_m + h).max(0.0)));
+            (middle, (high - low) / (2.0 * H_M), 0.0)
+        }
+    }
+}
+
+fn normal_pdf(z: f64) -> f64 {
+    (-0.5 * z * z).exp() / std::f64::consts::TAU.sqrt()
+}
+
+/// The normal distribution function by Zelen and Severo's formula 26.2.17 (Abramowitz and Stegun), within 7.5e-8.
+fn normal_cdf(z: f64) -> f64 {
+    let t = 1.0 / (1.0 + 0.231_641_9 * z.abs());
+    let tail = t
+        * (0.319_381_530
+            + t * (-0.356_563_782 + t * (1.781_477_937 + t * (-1.821_255_978 + t * 1.330_274_429))));
+    let upper = normal_pdf(z) * tail;
+    if z >= 0.0 { 1.0 - upper } else { upper }
+}
