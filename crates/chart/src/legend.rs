@@ -44,11 +44,12 @@ impl<'a> Block<'a> {
         Self::around(entries, height)
     }
 
-    /// The legend in as many columns as fit into the width, filled row by row.
+    /// The legend in as few rows as the width allows, filled row by row and about equally full.
     pub(crate) fn rows(marks: impl Iterator<Item = &'a Mark>, room: f64) -> Option<Self> {
         let mut entries = entries(marks);
         let widest = entries.iter().map(Entry::width).fold(1.0, f64::max);
-        let columns = (((room + BETWEEN_PX) / (widest + BETWEEN_PX)) as usize).max(1);
+        let fit = (((room + BETWEEN_PX) / (widest + BETWEEN_PX)) as usize).max(1);
+        let columns = entries.len().div_ceil(entries.len().div_ceil(fit).max(1)).max(1);
         let mut height = 0.0;
         for row in entries.chunks_mut(columns) {
             for (column, entry) in row.iter_mut().enumerate() {

@@ -48,6 +48,8 @@ pub(crate) enum Command {
     World(World),
     /// Fit the nonlinear response of an infra-red sensor to measured pairs
     FitSensor(FitSensor),
+    /// Trace what the model lacks in measured laps, add it, and tell the error before and after
+    Trace(Trace),
     /// List the effects that the simulator knows beyond the declared model
     Effects(Effects),
 }
@@ -118,7 +120,7 @@ pub(crate) struct Drive {
     #[arg(long)]
     pub(crate) log: bool,
     /// Force a way of casting rays
-    #[arg(long, value_name = "NAME", value_parser = ["brute", "bvh", "cells", "march"])]
+    #[arg(long, value_name = "NAME", value_parser = ["brute", "bvh", "cells", "tree"])]
     pub(crate) caster: Option<String>,
     /// Folder for the data set
     #[arg(long, value_name = "DIR")]
@@ -241,6 +243,34 @@ pub(crate) struct FitSensor {
 #[derive(Debug, Args)]
 pub(crate) struct Effects {
     /// Print one JSON document
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// Finds the residual between the declared model and measured laps, names the effect behind it with its size, what else it
+/// could be, and how far the simulation is from the robot before and after the effect is added.
+///
+/// Example: lapwing trace roduit2007 --measured real --out diagnosis
+#[derive(Debug, Args)]
+pub(crate) struct Trace {
+    #[command(flatten)]
+    pub(crate) model: ModelArgs,
+    /// Measured data set
+    #[arg(long, required = true, value_name = "DIR")]
+    pub(crate) measured: Vec<PathBuf>,
+    /// Data set that no fit sees, to measure the error on [default: each run is left out of the fit in turn]
+    #[arg(long, value_name = "DIR")]
+    pub(crate) held_out: Option<PathBuf>,
+    /// Folder for the report
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: PathBuf,
+    /// Folder in which the signatures of models are kept [default: the platform's cache folder]
+    #[arg(long, value_name = "DIR")]
+    pub(crate) cache: Option<PathBuf>,
+    /// Simulate the signatures anew and keep nothing
+    #[arg(long)]
+    pub(crate) no_cache: bool,
+    /// Print trace.json
     #[arg(long)]
     pub(crate) json: bool,
 }

@@ -105,6 +105,11 @@ impl DataSet {
         Self::from_source(Source::Shipped(Shipped::of(controller)))
     }
 
+    /// Whether these are laps that are shipped with this program.
+    pub(crate) fn is_shipped(&self) -> bool {
+        self.controller.is_some_and(|controller| Source::Shipped(Shipped::of(controller)).folder() == self.folder)
+    }
+
     fn from_source(source: Source<'_>) -> Result<Self> {
         let (mut set, names) = description::load(source)?;
         let runs: Vec<_> = names

@@ -2,7 +2,8 @@
 
 use anyhow::Result;
 use chart::{
-    Aspect, Axis, Color, Dash, Ellipse, Figure, Fill, GAP, Legend, Mark, Marker, Panel, Shape, Side, Style, palette,
+    Aspect, Axis, Color, Dash, Ellipse, Figure, Fill, GAP, Legend, Mark, Marker, Panel, Shape, Side, Style,
+    palette,
 };
 use pdm::{Modes, Pdm, Projection, covariance_ellipse};
 use sim::Circuit;
@@ -16,27 +17,58 @@ pub(crate) const MM: f64 = 1000.0;
 /// The outlines of both walls.
 pub(crate) fn walls(course: &Course) -> Mark {
     let outline = |wall: &Wall| {
-        (0..=600).map(|i| wall.point(f64::from(i) / 600.0)).map(|p| [p.x, p.y]).chain([GAP]).collect::<Vec<_>>()
+        (0..=600)
+            .map(|i| wall.point(f64::from(i) / 600.0))
+            .map(|p| [p.x, p.y])
+            .chain([GAP])
+            .collect::<Vec<_>>()
     };
     let points = [outline(&course.outer), outline(&course.inner)].concat();
-    Mark::new("", Style { width_px: 1.6, ..Style::color(Color::INK) }, Shape::Line(points))
+    Mark::new(
+        "",
+        Style {
+            width_px: 1.6,
+            ..Style::color(Color::INK)
+        },
+        Shape::Line(points),
+    )
 }
 
 /// The joints of the walls' b-splines.
 pub(crate) fn joints(course: &Course) -> Mark {
-    let points = course.outer.joints().chain(course.inner.joints()).map(|p| [p.x, p.y]).collect();
-    let style = Style { marker: Marker::Square, fill: Fill::Solid, size_px: 7.0, ..Style::color(Color::INK) };
+    let points = course
+        .outer
+        .joints()
+        .chain(course.inner.joints())
+        .map(|p| [p.x, p.y])
+        .collect();
+    let style = Style {
+        marker: Marker::Square,
+        fill: Fill::Solid,
+        size_px: 7.0,
+        ..Style::color(Color::INK)
+    };
     Mark::new("joints of the b-splines", style, Shape::Points(points))
 }
 
 /// All gates, from wall to wall.
 pub(crate) fn gates(circuit: &Circuit) -> Mark {
     let ends = |gate: &track::Gate| {
-        let (left, right) = (gate.center + gate.left * gate.left_m, gate.center - gate.left * gate.right_m);
+        let (left, right) = (
+            gate.center + gate.left * gate.left_m,
+            gate.center - gate.left * gate.right_m,
+        );
         [[left.x, left.y], [right.x, right.y]]
     };
-    let style = Style { width_px: 0.7, ..Style::color(Color::GREY) };
-    Mark::new("gates", style, Shape::Segments(circuit.gates.iter().map(ends).collect()))
+    let style = Style {
+        width_px: 0.7,
+        ..Style::color(Color::GREY)
+    };
+    Mark::new(
+        "gates",
+        style,
+        Shape::Segments(circuit.gates.iter().map(ends).collect()),
+    )
 }
 
 /// Where a lap crosses the gates, m.
@@ -82,16 +114,26 @@ pub(crate) fn laps_map(circuit: &Circuit, runs: &[SampledRun]) -> Figure {
             points
         };
         let points: Vec<[f64; 2]> = run.laps.iter().flat_map(lap).collect();
-        let style = Style { width_px: 0.7, opacity: 0.6, ..Style::color(palette(i)) };
+        let style = Style {
+            width_px: 0.7,
+            opacity: 0.6,
+            ..Style::color(palette(i))
+        };
         marks.push(Mark::new(format!("run {}", run.run), style, Shape::Line(points)));
     }
-    single("Laps", "Every lap kept, drawn through its positions at the gates.", map("", marks))
+    single(
+        "Laps",
+        "Every lap kept, drawn through its positions at the gates.",
+        map("", marks),
+    )
 }
 
 /// A cluster in the plane of the first two modes: its laps and the ellipse of two standard deviations.
 pub(crate) fn cluster_marks(projection: &Projection, label: &str, style: Style) -> Vec<Mark> {
     let points = projection.points();
-    let laps = (0..points.nrows()).map(|k| [MM * points[(k, 0)], MM * points[(k, 1)]]).collect();
+    let laps = (0..points.nrows())
+        .map(|k| [MM * points[(k, 0)], MM * points[(k, 1)]])
+        .collect();
     let mut marks = vec![Mark::new(label, style, Shape::Points(laps))];
     if let Ok(ellipse) = covariance_ellipse(projection, 2.0) {
         let shape = Shape::Ellipses(vec![Ellipse {
@@ -99,7 +141,16 @@ pub(crate) fn cluster_marks(projection: &Projection, label: &str, style: Style) 
             semi_axes: ellipse.semi_axes.map(|a| MM * a),
             angle_rad: ellipse.angle_rad,
         }]);
-        marks.push(Mark::new("", Style { width_px: 1.0, opacity: 0.9, fill: Fill::Open, ..style }, shape));
+        marks.push(Mark::new(
+            "",
+            Style {
+                width_px: 1.0,
+                opacity: 0.9,
+                fill: Fill::Open,
+                ..style
+            },
+            shape,
+        ));
     }
     marks
 }
@@ -110,7 +161,14 @@ pub(crate) fn modes_panel(title: &str, pdm: &Pdm, marks: Vec<Mark>) -> Panel {
         let share = 100.0 * pdm.explained().get(mode).copied().unwrap_or(0.0);
         Axis::linear(format!("mode {}, mm ({share:.0} % of the variance)", mode + 1))
     };
-    Panel { title: title.into(), x: axis(0), y: axis(1), marks, legend: Legend::Shared, ..Panel::default() }
+    Panel {
+        title: title.into(),
+        x: axis(0),
+        y: axis(1),
+        marks,
+        legend: Legend::Shared,
+        ..Panel::default()
+    }
 }
 
 /// All clusters of a PDM in the plane of its first two modes.
@@ -131,19 +189,40 @@ pub(crate) fn modes_figure(pdm: &Pdm, clusters: &[pdm::Cluster]) -> Result<Figur
 pub(crate) fn measured(run: usize) -> Style {
     let shade = [0.0, 0.45][run % 2];
     let color = Color::INK.mix(Color::WHITE, shade);
-    Style { width_px: 1.2, size_px: 6.0, marker: Marker::series(run), ..Style::color(color) }
+    Style {
+        width_px: 1.2,
+        size_px: 6.0,
+        marker: Marker::series(run),
+        ..Style::color(color)
+    }
 }
 
 /// How a simulation looks: solid and in colour.
 pub(crate) fn simulated(variant: usize) -> Style {
-    let markers = [Marker::Circle, Marker::Square, Marker::Diamond, Marker::Triangle, Marker::TriangleDown];
+    let markers = [
+        Marker::Circle,
+        Marker::Square,
+        Marker::Diamond,
+        Marker::Triangle,
+        Marker::TriangleDown,
+    ];
     let marker = markers[variant % markers.len()];
-    Style { fill: Fill::Solid, size_px: 6.0, width_px: 0.8, opacity: 0.85, marker, ..Style::color(palette(variant)) }
+    Style {
+        fill: Fill::Solid,
+        size_px: 6.0,
+        width_px: 0.8,
+        opacity: 0.85,
+        marker,
+        ..Style::color(palette(variant))
+    }
 }
 
 /// Laps as they were seen, each a line.
 pub(crate) fn paths(label: &str, style: Style, paths: &[Vec<[f64; 2]>]) -> Mark {
-    let points = paths.iter().flat_map(|path| path.iter().copied().chain([GAP])).collect();
+    let points = paths
+        .iter()
+        .flat_map(|path| path.iter().copied().chain([GAP]))
+        .collect();
     Mark::new(label, style, Shape::Line(points))
 }
 
@@ -157,8 +236,13 @@ pub(crate) struct Shown<'a> {
 
 /// These clusters in the plane of the first two modes.
 pub(crate) fn plane(title: &str, pdm: &Pdm, clusters: &[Shown<'_>]) -> Panel {
-    let marks = clusters.iter().flat_map(|shown| cluster_marks(shown.projection, &shown.label, shown.style));
-    Panel { size_px: [380.0, 300.0], ..modes_panel(title, pdm, marks.collect()) }
+    let marks = clusters
+        .iter()
+        .flat_map(|shown| cluster_marks(shown.projection, &shown.label, shown.style));
+    Panel {
+        size_px: [380.0, 300.0],
+        ..modes_panel(title, pdm, marks.collect())
+    }
 }
 
 /// These clusters in the plane of the first two modes, and beside it a close-up of those that `near` picks.
@@ -175,9 +259,10 @@ pub(crate) fn plane_and_close_up(title: &str, pdm: &Pdm, clusters: &[Shown<'_>],
     (close.x.range, close.y.range) = (range(0), range(1));
     Figure {
         title: title.into(),
-        description: "Every lap in the plane of the first two modes, with an ellipse of two standard deviations round \
+        description:
+            "Every lap in the plane of the first two modes, with an ellipse of two standard deviations round \
                       each cluster; at the right a close-up."
-            .into(),
+                .into(),
         panels: vec![all, close],
         columns: 2,
         legend: Side::Below,
@@ -191,7 +276,10 @@ fn reach(projection: &Projection) -> [[f64; 2]; 2] {
     [0, 1].map(|mode| {
         let column = points.column(mode);
         let (mean, deviation) = (column.mean(), column.variance().sqrt());
-        let (low, high) = (column.min().min(mean - 2.2 * deviation), column.max().max(mean + 2.2 * deviation));
+        let (low, high) = (
+            column.min().min(mean - 2.2 * deviation),
+            column.max().max(mean + 2.2 * deviation),
+        );
         [MM * low, MM * high]
     })
 }
@@ -199,11 +287,20 @@ fn reach(projection: &Projection) -> [[f64; 2]; 2] {
 /// Positions across the track against the gate, mm, positive to the left.
 pub(crate) fn across(curves: &[(String, Vec<f64>, Style)]) -> Panel {
     let curve = |(label, offsets_m, style): &(String, Vec<f64>, Style)| {
-        let points = offsets_m.iter().enumerate().map(|(gate, offset_m)| [gate as f64, MM * offset_m]).collect();
+        let points = offsets_m
+            .iter()
+            .enumerate()
+            .map(|(gate, offset_m)| [gate as f64, MM * offset_m])
+            .collect();
         Mark::new(label, *style, Shape::Line(points))
     };
     Panel {
-        x: Axis { range: curves.first().map(|(_, offsets_m, _)| [0.0, offsets_m.len() as f64]), ..Axis::linear("gate") },
+        x: Axis {
+            range: curves
+                .first()
+                .map(|(_, offsets_m, _)| [0.0, offsets_m.len() as f64]),
+            ..Axis::linear("gate")
+        },
         y: Axis::linear("position on the gate, mm (left of its centre: positive)"),
         marks: curves.iter().map(curve).collect(),
         ..Panel::default()
@@ -212,5 +309,9 @@ pub(crate) fn across(curves: &[(String, Vec<f64>, Style)]) -> Panel {
 
 /// A line in this style, of this pattern and width.
 pub(crate) fn line(color: Color, dash: Dash, width_px: f64) -> Style {
-    Style { dash, width_px, ..Style::color(color) }
+    Style {
+        dash,
+        width_px,
+        ..Style::color(color)
+    }
 }

@@ -16,6 +16,7 @@ mod report;
 mod session;
 mod setup;
 mod table;
+mod trace;
 
 use std::process::ExitCode;
 
@@ -50,6 +51,7 @@ fn run(cli: Cli) -> Result<()> {
         Command::Sweep(args) => commands::sweep::run(&session, &args),
         Command::World(args) => commands::world::run(&session, &args),
         Command::FitSensor(args) => commands::fit_sensor::run(&session, &args),
+        Command::Trace(args) => commands::trace::run(&session, &args),
         Command::Effects(args) => commands::effects::run(&session, &args),
     }
 }

@@ -30,12 +30,21 @@ impl Report {
              <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
              <title>{title}</title>\n<style>\n{STYLE}</style>\n</head>\n<body>\n<main>\n<h1>{title}</h1>\n"
         );
-        self.lead.iter().try_for_each(|block| write_block(&mut html, block))?;
+        self.lead
+            .iter()
+            .try_for_each(|block| write_block(&mut html, block))?;
         html += &contents(&self.sections);
         for (index, section) in self.sections.iter().enumerate() {
             let number = index + 1;
-            let _ = writeln!(html, "<section id=\"s{number}\">\n<h2>{number}. {}</h2>", escape(&section.heading));
-            section.blocks.iter().try_for_each(|block| write_block(&mut html, block))?;
+            let _ = writeln!(
+                html,
+                "<section id=\"s{number}\">\n<h2>{number}. {}</h2>",
+                escape(&section.heading)
+            );
+            section
+                .blocks
+                .iter()
+                .try_for_each(|block| write_block(&mut html, block))?;
             html.push_str("</section>\n");
         }
         html.push_str("</main>\n</body>\n</html>\n");
@@ -47,8 +56,15 @@ fn contents(sections: &[Section]) -> String {
     let entry = |(index, section): (usize, &Section)| {
         let (number, claims) = (index + 1, section.claims().count());
         let held = section.claims().filter(|claim| claim.holds).count();
-        let tally = if claims > 0 { format!(" <small>{held} of {claims} claims hold</small>") } else { String::new() };
-        format!("<li><a href=\"#s{number}\">{}</a>{tally}</li>\n", escape(&section.heading))
+        let tally = if claims > 0 {
+            format!(" <small>{held} of {claims} claims hold</small>")
+        } else {
+            String::new()
+        };
+        format!(
+            "<li><a href=\"#s{number}\">{}</a>{tally}</li>\n",
+            escape(&section.heading)
+        )
     };
     let entries: String = sections.iter().enumerate().map(entry).collect();
     format!("<nav>\n<ol>\n{entries}</ol>\n</nav>\n")
@@ -72,10 +88,19 @@ fn write_block(html: &mut String, block: &Block) -> Result<()> {
 }
 
 fn write_picture(html: &mut String, picture: &Picture) -> Result<()> {
-    let svg = picture.figure.to_svg().with_context(|| format!("figure {}", picture.file))?;
+    let svg = picture
+        .figure
+        .to_svg()
+        .with_context(|| format!("figure {}", picture.file))?;
+    // Panels side by side are too small for a phone's width: they scroll there.
+    let class = if picture.figure.columns > 1 {
+        " class=\"pair\""
+    } else {
+        ""
+    };
     let _ = writeln!(
         html,
-        "<figure>\n<div class=\"wide\">{svg}</div>\n<figcaption><b>{}.</b> {}</figcaption>\n</figure>",
+        "<figure{class}>\n<div class=\"wide\">{svg}</div>\n<figcaption><b>{}.</b> {}</figcaption>\n</figure>",
         escape(picture.number),
         escape(&picture.caption)
     );
@@ -85,7 +110,11 @@ fn write_picture(html: &mut String, picture: &Picture) -> Result<()> {
 fn write_claims(html: &mut String, claims: &[Claim]) {
     html.push_str("<ul class=\"claims\">\n");
     for claim in claims {
-        let (class, mark) = if claim.holds { ("holds", "✓") } else { ("fails", "✗") };
+        let (class, mark) = if claim.holds {
+            ("holds", "✓")
+        } else {
+            ("fails", "✗")
+        };
         let _ = writeln!(
             html,
             "<li class=\"{class}\"><b class=\"verdict\">{mark} {}</b> {}.<br>\n<span>Paper: {}. Here: {}.</span></li>",
@@ -108,12 +137,22 @@ mod tests {
         let mut table = Table::new("T", &["a < b"]);
         table.push(["1"]);
         let claims = vec![Claim::new("so & so", "1", "2", false)];
-        let section = Section { heading: "One".into(), blocks: vec![Block::Table(table), Block::Claims(claims)] };
-        let report = Report { title: "R".into(), lead: vec![Block::Text("x < y".into())], sections: vec![section] };
+        let section = Section {
+            heading: "One".into(),
+            blocks: vec![Block::Table(table), Block::Claims(claims)],
+        };
+        let report = Report {
+            title: "R".into(),
+            lead: vec![Block::Text("x < y".into())],
+            sections: vec![section],
+        };
         let html = report.to_html().unwrap();
         assert!(html.contains("x &lt; y") && html.contains("so &amp; so") && html.contains("a &lt; b"));
         assert!(html.contains("0 of 1 claims hold") && html.contains("✗ does not hold"));
         assert!(!html.contains("<script") && !html.contains("<link") && !html.contains("url("));
-        assert_eq!(html.matches("<section").count(), html.matches("</section>").count());
+        assert_eq!(
+            html.matches("<section").count(),
+            html.matches("</section>").count()
+        );
     }
 }

@@ -241,3 +241,32 @@ pub(crate) fn model_file(args: &ModelArgs) -> Result<ModelFile> {
     let source = if shipped { ModelSource::Embedded } else { ModelSource::Path(&args.model) };
     ModelFile::load(source, &args.settings.set)
 }
+
+/// The `[[effect]]` table of a setting: what [`Setup`] reads back to the same.
+pub(crate) fn effect_table(setting: &Setting) -> config::Effect {
+    let params = setting.spec.params;
+    let value = |param: &sim::Param, number: f64| match param.choices.get(number as usize) {
+        Some(choice) => Value::String((*choice).to_owned()),
+        None => Value::Float(number),
+    };
+    let mut parameters = toml::Table::new();
+    let by = match &setting.pattern {
+        Pattern::Constant(values) => {
+            parameters.extend(params.iter().zip(values).map(|(p, v)| (p.name.to_owned(), value(p, *v))));
+            None
+        }
+        Pattern::ByTime { start, per_s } => {
+            parameters.extend(params.iter().zip(start).map(|(p, v)| (p.name.to_owned(), value(p, *v))));
+            let slopes = params.iter().zip(per_s).filter(|(_, slope)| **slope != 0.0);
+            parameters.extend(slopes.map(|(p, slope)| (format!("{}_per_s", p.name), Value::Float(*slope))));
+            Some(config::Pattern::Time)
+        }
+        Pattern::ByRun(runs) => {
+            parameters.extend(params.iter().enumerate().map(|(i, p)| {
+                (p.name.to_owned(), Value::Array(runs.iter().map(|values| value(p, values[i])).collect()))
+            }));
+            Some(config::Pattern::Run)
+        }
+    };
+    config::Effect { kind: setting.spec.name.to_owned(), by, parameters }
+}

@@ -13,7 +13,11 @@ pub(crate) struct Table {
 
 impl Table {
     pub(crate) fn new(title: impl Into<String>, columns: &[&str]) -> Self {
-        Self { title: title.into(), columns: columns.iter().map(|c| (*c).to_owned()).collect(), rows: Vec::new() }
+        Self {
+            title: title.into(),
+            columns: columns.iter().map(|c| (*c).to_owned()).collect(),
+            rows: Vec::new(),
+        }
     }
 
     pub(crate) fn push(&mut self, row: impl IntoIterator<Item = impl Into<String>>) {
@@ -24,12 +28,20 @@ impl Table {
     pub(crate) fn to_text(&self) -> String {
         let width = |i: usize| {
             let cells = self.rows.iter().filter_map(|row| row.get(i));
-            cells.chain(self.columns.get(i)).map(|cell| cell.chars().count()).max().unwrap_or(0)
+            cells
+                .chain(self.columns.get(i))
+                .map(|cell| cell.chars().count())
+                .max()
+                .unwrap_or(0)
         };
         let widths: Vec<usize> = (0..self.columns.len()).map(width).collect();
         let line = |cells: &[String]| {
             let padded = cells.iter().zip(&widths).enumerate().map(|(i, (cell, &width))| {
-                if i == 0 { format!("{cell:<width$}") } else { format!("{cell:>width$}") }
+                if i == 0 {
+                    format!("{cell:<width$}")
+                } else {
+                    format!("{cell:>width$}")
+                }
             });
             padded.collect::<Vec<_>>().join("  ").trim_end().to_owned()
         };
@@ -38,23 +50,46 @@ impl Table {
             let _ = writeln!(text, "{}", self.title);
         }
         let _ = writeln!(text, "{}", line(&self.columns));
-        let _ = writeln!(text, "{}", "-".repeat(widths.iter().sum::<usize>() + 2 * widths.len().saturating_sub(1)));
+        let _ = writeln!(
+            text,
+            "{}",
+            "-".repeat(widths.iter().sum::<usize>() + 2 * widths.len().saturating_sub(1))
+        );
         for row in &self.rows {
             let _ = writeln!(text, "{}", line(row));
         }
         text
     }
 
+    /// As CSV; cells with a comma or a quotation mark are quoted.
+    pub(crate) fn to_csv(&self) -> String {
+        let cell = |cell: &String| match cell.contains([',', '"', '\n']) {
+            true => format!("\"{}\"", cell.replace('"', "\"\"")),
+            false => cell.clone(),
+        };
+        let line = |row: &Vec<String>| row.iter().map(cell).collect::<Vec<_>>().join(",") + "\n";
+        std::iter::once(&self.columns)
+            .chain(&self.rows)
+            .map(line)
+            .collect()
+    }
+
     /// As an HTML table; the title is its caption.
     pub(crate) fn to_html(&self) -> String {
         let cells = |tag: &str, row: &[String]| {
-            row.iter().map(|cell| format!("<{tag}>{}</{tag}>", escape(cell))).collect::<String>()
+            row.iter()
+                .map(|cell| format!("<{tag}>{}</{tag}>", escape(cell)))
+                .collect::<String>()
         };
         let mut html = String::from("<table>\n");
         if !self.title.is_empty() {
             let _ = writeln!(html, "<caption>{}</caption>", escape(&self.title));
         }
-        let _ = writeln!(html, "<thead><tr>{}</tr></thead>\n<tbody>", cells("th", &self.columns));
+        let _ = writeln!(
+            html,
+            "<thead><tr>{}</tr></thead>\n<tbody>",
+            cells("th", &self.columns)
+        );
         for row in &self.rows {
             let _ = writeln!(html, "<tr>{}</tr>", cells("td", row));
         }
@@ -65,12 +100,19 @@ impl Table {
 
 /// Text as it may stand in HTML.
 pub(crate) fn escape(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+    text.replace('&', "&amp;")
+        .replace('<', "&lt;")
+        .replace('>', "&gt;")
+        .replace('"', "&quot;")
 }
 
 /// A probability as a reader wants it: three decimals, or the power of ten of a small one.
 pub(crate) fn probability(p: f64) -> String {
-    if p >= 0.001 { format!("{p:.3}") } else { format!("{p:.0e}") }
+    if p >= 0.001 {
+        format!("{p:.3}")
+    } else {
+        format!("{p:.0e}")
+    }
 }
 
 #[cfg(test)]
@@ -82,7 +124,12 @@ mod tests {
         let mut table = Table::new("T", &["run", "d"]);
         table.push(["a & b", "1.0"]);
         table.push(["c", "10.0"]);
-        assert_eq!(table.to_text(), "T\nrun       d\n-----------\na & b   1.0\nc      10.0\n");
+        assert_eq!(
+            table.to_text(),
+            "T\nrun       d\n-----------\na & b   1.0\nc      10.0\n"
+        );
         assert!(table.to_html().contains("<td>a &amp; b</td>"));
+        table.push(["d, \"e\"", "2"]);
+        assert!(table.to_csv().ends_with("c,10.0\n\"d, \"\"e\"\"\",2\n"));
     }
 }

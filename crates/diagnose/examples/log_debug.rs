@@ -99,6 +99,13 @@ fn main() -> Result<()> {
         ["a", "b", "c", "d"].iter().map(|r| read(&std::path::Path::new(&args[2]).join(format!("run_{r}.csv.gz")))).collect::<Result<_>>()?
     };
     let t = std::time::Instant::now();
+    if args.iter().any(|_| std::env::var("SEARCH").is_ok()) {
+        for (n, g) in diagnose::debug_search(&model, &scene, &runs) {
+            println!("{g:10.1}  {n}");
+        }
+        println!("took {:?}", t.elapsed());
+        return Ok(());
+    }
     let mut scores = diagnose::debug_screen(&model, &scene, &runs);
     println!("took {:?}", t.elapsed());
     scores.sort_by(|a, b| b.1.total_cmp(&a.1));

@@ -29,4 +29,7 @@ pub enum Error {
     /// Too few simulated laps for the number of coordinates.
     #[error("too few laps for the number of gates: more runs or more laps are needed")]
     TooFewLaps,
+    /// A robot that crashes or stops with the effects found.
+    #[error("with the effects found the simulated robot does not complete its laps")]
+    Crash,
 }

@@ -10,5 +10,5 @@ mod response_fit;
 pub use candidate::Candidate;
 pub use error::Error;
 pub use laps::{Atlas, Diagnosis, Explanation, FourNumbers, Quadratic, Simulate, Verdict, debug as laps_debug};
-pub use log::{LogRow, debug_screen};
+pub use log::{LogRow, debug_screen, debug_search};
 pub use response_fit::{Estimate, ResponseFit};

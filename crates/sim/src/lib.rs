@@ -7,6 +7,7 @@
 
 mod cast;
 mod controller;
+mod cut;
 mod effects;
 mod error;
 mod forecast;
@@ -21,6 +22,7 @@ mod world;
 
 pub use cast::{Caster, CasterKind, Hits, LANES, Rays, segment_distance_m};
 pub use controller::Controller;
+pub use cut::{max_error_for, segment_count};
 pub use effects::{EFFECTS, Effect, Hit, Moment, Param, Pattern, Setting, Site, Spec, Stage, UNLISTED, find};
 pub use error::Error;
 pub use forecast::{Forecast, Motion, PoseMatrix};

@@ -262,6 +262,36 @@ mod tests {
     }
 
     #[test]
+    fn the_power_is_the_library_s_within_1e_13() {
+        for i in 0..4000 {
+            let x = 1e-6 * 1.005_f64.powi(i); // to 460
+            for p in [0.3, 1.0, 1.572_816_92, 4.0, 20.0] {
+                let expected = x.powf(p);
+                assert!((power(x, p) / expected - 1.0).abs() < 1e-13, "{x}^{p}: {} for {expected}", power(x, p));
+            }
+        }
+        assert_eq!(power(0.0, 1.5), 0.0);
+        assert_eq!(power(1.0, 7.0), 1.0);
+    }
+
+    #[test]
+    fn eight_readings_are_one_reading_eight_times() {
+        let table = Response::Table(vec![[0.0, 3800.0], [0.04, 1200.0], [0.1, 300.0]]);
+        for response in [IMPROVED, table] {
+            let distances = [0.0, 1e-9, 0.003, 0.04, 0.05, 0.0999, 0.1, f64::INFINITY];
+            assert_eq!(response.readings(&distances), distances.map(|d| response.reading(d)));
+        }
+    }
+
+    #[test]
+    fn a_table_is_held_at_its_ends() {
+        let table = Response::Table(vec![[0.01, 3800.0], [0.04, 1200.0], [0.1, 300.0]]);
+        for (d, reading) in [(0.0, 3800.0), (0.01, 3800.0), (0.04, 1200.0), (0.07, 750.0), (0.1, 300.0), (1.0, 300.0)] {
+            assert!((table.reading(d) - reading).abs() < 1e-9, "{d}: {}", table.reading(d));
+        }
+    }
+
+    #[test]
     fn original_response_is_a_line() {
         let original = Response::Table(vec![[0.0, 3800.0], [0.1, 300.0]]);
         for (d, reading) in [(0.0, 3800.0), (0.1, 300.0), (0.025, 2925.0)] {

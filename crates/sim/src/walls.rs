@@ -124,12 +124,6 @@ impl Walls {
         (&self.x_m, &self.y_m)
     }
 
-    /// Whether vertex `i` and the next are a segment.
-    #[inline]
-    pub(crate) fn is_segment(&self, i: usize) -> bool {
-        self.pieces[i].is_some()
-    }
-
     /// Unit vector across a segment, to the left of its direction.
     pub fn normal(&self, segment: usize) -> Vec2 {
         (self.vertex(segment + 1) - self.vertex(segment)).normalize_or_zero().perp()

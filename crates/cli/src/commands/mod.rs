@@ -6,4 +6,5 @@ pub(crate) mod effects;
 pub(crate) mod fit_sensor;
 pub(crate) mod reproduce;
 pub(crate) mod sweep;
+pub(crate) mod trace;
 pub(crate) mod world;

@@ -20,7 +20,10 @@ const FOLDER: &str = "lapwing-report";
 pub(crate) fn run(session: &Session, args: &Reproduce) -> Result<()> {
     let out = args.out.clone().unwrap_or_else(|| PathBuf::from(FOLDER));
     let measured = Measurements::load(&args.measured)?;
-    measured.remarks().iter().for_each(|remark| session.remark(remark));
+    measured
+        .remarks()
+        .iter()
+        .for_each(|remark| session.remark(remark));
     let inputs = measured.inputs();
     let configuration = json!({
         "standard": measured.standard()?, "rule_based": measured.rule_based()?,
@@ -46,7 +49,11 @@ pub(crate) fn run(session: &Session, args: &Reproduce) -> Result<()> {
     write(&folder, &tables, report(session.seed(), &study, outcomes))?;
     interrupt::check()?;
     folder.finish(&session.manifest(configuration, inputs))?;
-    if args.json { session.print_json(&tables) } else { session.print(&text) }
+    if args.json {
+        session.print_json(&tables)
+    } else {
+        session.print(&text)
+    }
 }
 
 /// `tables.json`.
@@ -71,7 +78,10 @@ fn text(outcomes: &[Outcome], out: &Path) -> String {
         text += &format!("{}\n", table.to_text());
     }
     let held = claims(outcomes).filter(|claim| claim.holds).count();
-    text += &format!("Claims of section IV: {held} of {} hold here\n", claims(outcomes).count());
+    text += &format!(
+        "Claims of section IV: {held} of {} hold here\n",
+        claims(outcomes).count()
+    );
     for claim in claims(outcomes) {
         text += &format!(
             "{:>4}  {}\n      paper: {}\n      here:  {}\n",
@@ -112,65 +122,103 @@ fn report(seed: u64, study: &Study, outcomes: Vec<Outcome>) -> Files {
     sections.push(carries);
     sections.push(configuration(seed, study));
     let title = "Laps of a mobile robot, measured and simulated: the experiments of Roduit, Martinoli and Jacot (2007)";
-    Files { report: Report { title: title.into(), lead, sections }, csv }
+    Files {
+        report: Report {
+            title: title.into(),
+            lead,
+            sections,
+        },
+        csv,
+    }
 }
 
 /// What the data are, the method in three lines, and how many claims hold.
 fn lead(study: &Study, outcomes: &[Outcome]) -> Vec<Block> {
-    let (held, all) = (claims(outcomes).filter(|claim| claim.holds).count(), claims(outcomes).count());
-    let measured = [&study.measured.rule_based.set, &study.measured.braitenberg.set];
-    let [one, other] = measured.map(|set| format!("{} ({})", set.name, note(set)));
+    let (held, all) = (
+        claims(outcomes).filter(|claim| claim.holds).count(),
+        claims(outcomes).count(),
+    );
+    let (gates, laps, draws) = (study.circuit().gates.len(), study.laps, study.draws.len());
+    let sets = [&study.measured.rule_based.set, &study.measured.braitenberg.set];
     let paragraphs = [
         format!(
             "This report repeats section IV of “A quantitative method for comparing trajectories of mobile robots using \
-             point distribution models” (IROS 2007). The measured laps are the data sets {one}, and {other}. Of the \
-             {all} claims of that section that can be put to the test, {held} hold on these laps."
+             point distribution models” (IROS 2007). {} Of the {all} claims of that section that can be put to the test, \
+             {held} hold on these laps.",
+            provenance(sets)
         ),
         format!(
-            "Method. A lap is its positions on {} gates across the corridor (eq. 1); the first lap of a run is dropped. \
-             All laps that are compared go into one Point Distribution Model, whose modes are the principal axes of \
-             their covariance (eq. 2). Two clusters are compared in the first two modes by the distance of their means \
-             in units of their pooled covariance (eq. 8) and by Hotelling's test (eq. 9).",
-            study.circuit().gates.len()
+            "Method. A lap is its positions on {gates} gates across the corridor (eq. 1); the first lap of a run is \
+             dropped. All laps that are compared go into one Point Distribution Model (PDM), whose modes are the \
+             principal axes of their covariance (eq. 2). Two clusters are compared in the first two modes by the distance \
+             of their means in units of their pooled covariance (eq. 8) and by Hotelling's test (eq. 9)."
         ),
         format!(
-            "Confidence. A simulated cluster is one run of {} laps, as in the paper, and therefore one draw. Everything \
-             simulated is drawn {} times from random streams of its own, with a PDM for each draw: numbers are means \
-             over the draws with the interval that holds the middle 95 % of them in brackets, and figures show the \
-             first draw. The interval tells how much one draw of {} laps moves, not how well the mean is known. A claim \
-             about simulated laps holds if it does in at least 95 % of the draws.",
-            study.laps,
-            study.draws.len(),
-            study.laps
+            "Confidence. A simulated cluster is one run of {laps} laps, as in the paper, and therefore one draw. All that \
+             is simulated is drawn {draws} times from random streams of its own, with a PDM for each draw: numbers are \
+             means over the draws with the interval that holds the middle 95 % of them in brackets, and figures show the \
+             first draw. The interval tells how much one draw of {laps} laps moves, not how well the mean is known. A \
+             claim about simulated laps holds if it does in at least 95 % of the draws."
         ),
     ];
     paragraphs.into_iter().map(Block::Text).collect()
 }
 
-fn note(set: &DataSet) -> &str {
-    if set.note.is_empty() { "no note" } else { &set.note }
+/// Where the measured laps come from.
+fn provenance(sets: [&DataSet; 2]) -> String {
+    let named = |set: &&DataSet| match set.note.as_str() {
+        "" => set.name.clone(),
+        note => format!("{} ({note})", set.name),
+    };
+    let (shipped, given): (Vec<&DataSet>, Vec<&DataSet>) = sets.into_iter().partition(|set| set.is_shipped());
+    let mut text = String::new();
+    if !given.is_empty() {
+        text += &format!(
+            "The measured laps are those of {}. ",
+            given.iter().map(named).collect::<Vec<_>>().join(" and ")
+        );
+    }
+    if !shipped.is_empty() {
+        let names = shipped
+            .iter()
+            .map(|set| set.name.as_str())
+            .collect::<Vec<_>>()
+            .join(" and ");
+        text += &format!(
+            "The measured laps of {names} are generated: the paper's camera laps were never published, and these stand in \
+             for them. They come from a separate program whose robot differs from the declared model in ways that are not \
+             declared. "
+        );
+    }
+    text.trim_end().to_owned()
 }
 
 /// What of the paper is not so here, and why that is to be expected or not.
 fn carry_over(outcomes: &[Outcome]) -> Section {
     let mut blocks = vec![Block::Text(
-        "The paper's laps, its walls as numbers and its controllers' constants were never published. The shipped laps \
-         stand in for the camera runs: they are generated by a separate program whose robot differs from the declared \
-         model in ways that are not declared. The course is our own shape, chosen to need the paper's numbers of \
-         segments. So printed distances are not expected to be met, and claims about these particular runs (which run is \
-         nearest, how far runs are apart, which wall error happens to be nearest) need not be; what the method and the \
-         order of the influences say should be. Modes are those of each PDM: their axes mean different things in \
-         different figures, and in the paper's."
+        "The paper's laps, its walls as numbers and the constants of its controllers were never published: neither the \
+         laps nor the shape of the shipped course are the paper's, only the numbers of segments are. So printed distances \
+         are not expected to be met, and claims about those particular runs (which run is nearest, how far runs are \
+         apart, which wall error happens to be nearest) need not hold; what the method finds, and the order of the \
+         influences, should. Distances depend on how much laps scatter: measured laps scatter more or less than the \
+         paper's, and all distances shrink or grow with that. Modes belong to the PDM of each comparison: their axes mean \
+         different things in different figures and in the paper's."
             .into(),
     )];
     let failed: Vec<Claim> = claims(outcomes).filter(|claim| !claim.holds).cloned().collect();
     if failed.is_empty() {
         blocks.push(Block::Text("Every claim holds on these laps.".into()));
     } else {
-        blocks.push(Block::Text(format!("{} claims do not hold on these laps:", failed.len())));
+        blocks.push(Block::Text(format!(
+            "{} claims do not hold on these laps:",
+            failed.len()
+        )));
         blocks.push(Block::Table(failures(&failed)));
     }
-    Section { heading: "What does not carry over".into(), blocks }
+    Section {
+        heading: "What does not carry over".into(),
+        blocks,
+    }
 }
 
 fn failures(claims: &[Claim]) -> Table {
@@ -193,5 +241,8 @@ fn configuration(seed: u64, study: &Study) -> Section {
         Block::Text("The declared model of the standard simulation:".into()),
         Block::Code(study.standard.to_toml()),
     ];
-    Section { heading: "Seed and configuration".into(), blocks }
+    Section {
+        heading: "Seed and configuration".into(),
+        blocks,
+    }
 }

@@ -17,7 +17,7 @@ use serde_json::{Value, json};
 use sim::{Circuit, Streams};
 
 use crate::args;
-use crate::config::{Config, ModelFile, WorldSource};
+use crate::config::{Config, WorldSource};
 use crate::dataset::DataSet;
 use crate::interrupt;
 use crate::laps::{self, Measured, SampledRun};
@@ -73,7 +73,7 @@ impl Sweep {
         let file = setup::model_file(&args.model)?;
         let world = file.world(args.model.settings.world.as_deref())?;
         let circuit = setup::model_circuit(&file, &world)?;
-        let set = measured_set(args, &file, &world)?;
+        let set = measured_set(args, &world)?;
         remark_on_declared(session, &set, &file.config)?;
         let base = Base { file: &file, world: &world, circuit: &circuit, runs: args.runs as usize };
         let grid = Grid::new(&base, &args.vary)?;
@@ -180,16 +180,16 @@ impl Sweep {
 }
 
 /// The measured laps, which must have been driven in the model's world.
-fn measured_set(args: &args::Sweep, file: &ModelFile, world: &WorldSource) -> Result<DataSet> {
+fn measured_set(args: &args::Sweep, world: &WorldSource) -> Result<DataSet> {
     let set = DataSet::load(&args.measured)?;
     let driven_in = set.world_source(args.model.settings.world.as_deref())?;
     if driven_in.text != world.text {
         bail!(
-            "{}: driven in the world {}, but the model is of {}: laps are compared gate by gate, so let `world` of \
-             the model name the same, or pass --world FILE for both",
+            "{}: driven in {}, but the model's world is {}: laps are compared gate by gate, so let `world` of the model name \
+             the same, or pass --world FILE for both",
             args.measured.display(),
             driven_in.label,
-            file.located("world", &world.label),
+            world.label,
         );
     }
     Ok(set)

@@ -370,6 +370,7 @@ fn the_shipped_laps_are_there_without_a_folder() {
     for controller in [ControllerKind::RuleBased, ControllerKind::Braitenberg] {
         let set = DataSet::shipped(controller).unwrap();
         assert_eq!(set.controller, Some(controller));
+        assert!(set.is_shipped());
         let runs: Vec<_> = set.runs.iter().map(|run| run.name.as_str()).collect();
         assert_eq!((runs, set.laps, set.inputs.len()), (vec!["a", "b", "c", "d"], 20, 5));
         assert!(set.runs.iter().all(|run| run.rows.t_s.len() > 20_000));

@@ -12,7 +12,12 @@ use crate::figures::{self, Shown, measured, simulated};
 use crate::table::Table;
 
 /// The clusters after run d, which is the first.
-const VARIANTS: [Variant; 4] = [Variant::Standard, Variant::OriginalSensor, Variant::Slip100, Variant::Wall50];
+const VARIANTS: [Variant; 4] = [
+    Variant::Standard,
+    Variant::OriginalSensor,
+    Variant::Slip100,
+    Variant::Wall50,
+];
 const KEYS: [&str; 4] = ["standard", "original_sensor", "slip_100", "wall_50_mm"];
 const RUN: usize = 0;
 const STANDARD: usize = 1;
@@ -44,7 +49,10 @@ pub(crate) fn outcome(study: &Study) -> Result<Outcome> {
         Block::Claims(claims(&comparison, &run)),
     ];
     Ok(Outcome {
-        section: Section { heading: "All three features together".into(), blocks },
+        section: Section {
+            heading: "All three features together".into(),
+            blocks,
+        },
         csv: vec![("combined.csv", csv(&comparison))],
         json: vec![("combined", json(&comparison))],
     })
@@ -59,11 +67,17 @@ fn name(variant: Variant) -> String {
 
 fn table(comparison: &Comparison, run: &str) -> Table {
     let head = format!("distance to run {run}");
-    let mut table =
-        Table::new("One feature changed at a time (Fig. 14)", &["simulation", &head, "distance to the standard simulation"]);
+    let mut table = Table::new(
+        "One feature changed at a time (Fig. 14)",
+        &["simulation", &head, "distance to the standard simulation"],
+    );
     for (place, variant) in VARIANTS.into_iter().enumerate() {
         let cluster = place + 1;
-        let moved = if cluster == STANDARD { "-".into() } else { comparison.distance(cluster, STANDARD).text(1) };
+        let moved = if cluster == STANDARD {
+            "-".into()
+        } else {
+            comparison.distance(cluster, STANDARD).text(1)
+        };
         table.push([name(variant), comparison.distance(cluster, RUN).text(1), moved]);
     }
     table
@@ -72,12 +86,20 @@ fn table(comparison: &Comparison, run: &str) -> Table {
 fn claims(comparison: &Comparison, run: &str) -> Vec<Claim> {
     let to_run = |cluster: usize| comparison.distance(cluster, RUN).text(1);
     let moved = |cluster: usize| comparison.distance(cluster, STANDARD).text(1);
-    let change = |draw: &Space, cluster: usize| (draw.distance(cluster, RUN) - draw.distance(STANDARD, RUN)).abs();
+    let change =
+        |draw: &Space, cluster: usize| (draw.distance(cluster, RUN) - draw.distance(STANDARD, RUN)).abs();
     vec![
         Claim::counted(
-            format!("Changing the sensor model or the wall error makes the simulation much less like run {run}"),
+            format!(
+                "Changing the sensor model or the wall error makes the simulation much less like run {run}"
+            ),
             "seen in Fig. 14",
-            &format!("{} and {} against {}", to_run(SENSOR), to_run(WALL), to_run(STANDARD)),
+            &format!(
+                "{} and {} against {}",
+                to_run(SENSOR),
+                to_run(WALL),
+                to_run(STANDARD)
+            ),
             comparison.tally(|draw| {
                 draw.distance(SENSOR, RUN).min(draw.distance(WALL, RUN)) > 2.0 * draw.distance(STANDARD, RUN)
             }),
@@ -87,7 +109,8 @@ fn claims(comparison: &Comparison, run: &str) -> Vec<Claim> {
             "seen in Fig. 14",
             &format!("{} against {} and {}", moved(SLIP), moved(SENSOR), moved(WALL)),
             comparison.tally(|draw| {
-                draw.distance(SLIP, STANDARD) < 0.5 * draw.distance(SENSOR, STANDARD).min(draw.distance(WALL, STANDARD))
+                draw.distance(SLIP, STANDARD)
+                    < 0.5 * draw.distance(SENSOR, STANDARD).min(draw.distance(WALL, STANDARD))
             }),
         ),
         Claim::counted(
@@ -108,8 +131,16 @@ fn claims(comparison: &Comparison, run: &str) -> Vec<Claim> {
 
 fn figure(comparison: &Comparison, place: usize, run: &str) -> Figure {
     let shown = |(cluster, projection)| match cluster {
-        RUN => Shown { projection, label: format!("measured, run {run}"), style: measured(place) },
-        _ => Shown { projection, label: name(VARIANTS[cluster - 1]), style: simulated(cluster - 1) },
+        RUN => Shown {
+            projection,
+            label: format!("measured, run {run}"),
+            style: measured(place),
+        },
+        _ => Shown {
+            projection,
+            label: name(VARIANTS[cluster - 1]),
+            style: simulated(cluster - 1),
+        },
     };
     let clusters: Vec<Shown<'_>> = comparison.projections.iter().enumerate().map(shown).collect();
     let near = [RUN, STANDARD, SLIP];
@@ -117,7 +148,8 @@ fn figure(comparison: &Comparison, place: usize, run: &str) -> Figure {
 }
 
 fn csv(comparison: &Comparison) -> String {
-    let mut csv = String::from("simulation,distance_to_run,low,high,distance_to_standard,standard_low,standard_high\n");
+    let mut csv =
+        String::from("simulation,distance_to_run,low,high,distance_to_standard,standard_low,standard_high\n");
     for (place, key) in KEYS.iter().enumerate() {
         let cells = [RUN, STANDARD].map(|to| {
             let Estimate { mean, low, high, .. } = comparison.distance(place + 1, to);

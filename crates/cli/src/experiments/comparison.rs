@@ -8,7 +8,7 @@ use super::estimate::{Estimate, Tally};
 use crate::interrupt;
 
 /// Below this probability two clusters count as different.
-pub(crate) const LEVEL: f64 = 0.05;
+const LEVEL: f64 = 0.05;
 
 /// Clusters compared in D draws.
 #[derive(Debug)]
@@ -66,14 +66,23 @@ impl Comparison {
         let model = |clusters: &Vec<&Cluster>| -> Result<(Pdm, Vec<Projection>)> {
             interrupt::check()?;
             let pdm = Pdm::fit(clusters.iter().copied())?; // eq. 2
-            let projections = clusters.iter().map(|cluster| pdm.project(cluster, Modes::First(2)));
+            let projections = clusters
+                .iter()
+                .map(|cluster| pdm.project(cluster, Modes::First(2)));
             let projections = projections.collect::<Result<_, _>>()?;
             Ok((pdm, projections))
         };
         let (pdm, projections) = model(&draws[0])?;
-        let others = draws[1..].par_iter().map(|clusters| space(&model(clusters)?.1)).collect::<Result<Vec<_>>>()?;
+        let others = draws[1..]
+            .par_iter()
+            .map(|clusters| space(&model(clusters)?.1))
+            .collect::<Result<Vec<_>>>()?;
         let draws = std::iter::once(space(&projections)?).chain(others).collect();
-        Ok(Self { pdm, projections, draws })
+        Ok(Self {
+            pdm,
+            projections,
+            draws,
+        })
     }
 
     /// A number of each draw.
@@ -95,9 +104,20 @@ impl Comparison {
 fn space(projections: &[Projection]) -> Result<Space> {
     let pair = |x: &Projection, y: &Projection| -> Result<Pair> {
         let test = hotelling(x, y)?;
-        Ok(Pair { distance: test.distance, p: test.p, contrast: covariance_contrast(x, y)? })
+        Ok(Pair {
+            distance: test.distance,
+            p: test.p,
+            contrast: covariance_contrast(x, y)?,
+        })
     };
-    let pairs = projections.iter().flat_map(|x| projections.iter().map(move |y| pair(x, y)));
-    let ellipses = projections.iter().map(|projection| covariance_ellipse(projection, 1.0));
-    Ok(Space { pairs: pairs.collect::<Result<_>>()?, ellipses: ellipses.collect::<Result<_, _>>()? })
+    let pairs = projections
+        .iter()
+        .flat_map(|x| projections.iter().map(move |y| pair(x, y)));
+    let ellipses = projections
+        .iter()
+        .map(|projection| covariance_ellipse(projection, 1.0));
+    Ok(Space {
+        pairs: pairs.collect::<Result<_>>()?,
+        ellipses: ellipses.collect::<Result<_, _>>()?,
+    })
 }

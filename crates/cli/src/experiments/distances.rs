@@ -33,14 +33,25 @@ impl Distances {
     /// The paper's line and ours for each simulation.
     pub(crate) fn table(&self) -> Table {
         let heads: Vec<String> = self.runs.iter().map(|run| format!("run {run}")).collect();
-        let columns: Vec<&str> = ["distance to"].into_iter().chain(heads.iter().map(String::as_str)).collect();
+        let columns: Vec<&str> = ["distance to"]
+            .into_iter()
+            .chain(heads.iter().map(String::as_str))
+            .collect();
         let mut table = Table::new(&self.title, &columns);
         for row in &self.rows {
             if let Some(paper) = row.paper {
                 let cell = |run: &String| paper.of_run(run).map_or("-".into(), |d| format!("{d:.1}"));
-                table.push([format!("{}, paper", row.name)].into_iter().chain(self.runs.iter().map(cell)));
+                table.push(
+                    [format!("{}, paper", row.name)]
+                        .into_iter()
+                        .chain(self.runs.iter().map(cell)),
+                );
             }
-            table.push([format!("{}, here", row.name)].into_iter().chain(row.here.iter().map(|e| e.text(1))));
+            table.push(
+                [format!("{}, here", row.name)]
+                    .into_iter()
+                    .chain(row.here.iter().map(|e| e.text(1))),
+            );
         }
         table
     }
@@ -49,8 +60,20 @@ impl Distances {
     pub(crate) fn csv(&self) -> String {
         let mut csv = String::from("simulation,run,paper,distance,low,high,first\n");
         for row in &self.rows {
-            for (run, Estimate { mean, low, high, first }) in self.runs.iter().zip(&row.here) {
-                let paper = row.paper.and_then(|paper| paper.of_run(run)).map_or(String::new(), |d| d.to_string());
+            for (
+                run,
+                Estimate {
+                    mean,
+                    low,
+                    high,
+                    first,
+                },
+            ) in self.runs.iter().zip(&row.here)
+            {
+                let paper = row
+                    .paper
+                    .and_then(|paper| paper.of_run(run))
+                    .map_or(String::new(), |d| d.to_string());
                 csv += &format!("{},{run},{paper},{mean},{low},{high},{first}\n", row.key);
             }
         }
@@ -78,17 +101,50 @@ impl Distances {
         let mut marks = Vec::new();
         for (i, row) in self.rows.iter().enumerate() {
             let place = |run: usize| run as f64 + (i as f64 - (self.rows.len() - 1) as f64 / 2.0) * spread;
-            let ours = Style { fill: Fill::Solid, ..Style::color(palette(i)) };
-            let points = row.here.iter().enumerate().map(|(run, e)| [place(run), e.mean]).collect();
-            let interval = |(run, e): (usize, &Estimate)| Interval { at: place(run), low: e.low, high: e.high };
+            let ours = Style {
+                fill: Fill::Solid,
+                ..Style::color(palette(i))
+            };
+            let points = row
+                .here
+                .iter()
+                .enumerate()
+                .map(|(run, e)| [place(run), e.mean])
+                .collect();
+            let interval = |(run, e): (usize, &Estimate)| Interval {
+                at: place(run),
+                low: e.low,
+                high: e.high,
+            };
             let intervals = row.here.iter().enumerate().map(interval).collect();
-            let bars = Shape::ErrorBars { intervals, direction: Direction::Vertical };
-            marks.push(Mark::new(&row.name, Style { width_px: 1.2, ..ours }, bars));
+            let bars = Shape::ErrorBars {
+                intervals,
+                direction: Direction::Vertical,
+            };
+            marks.push(Mark::new(
+                &row.name,
+                Style {
+                    width_px: 1.2,
+                    ..ours
+                },
+                bars,
+            ));
             marks.push(Mark::new(&row.name, ours, Shape::Points(points)));
             let printed = self.runs.iter().enumerate();
-            let printed = printed.filter_map(|(run, name)| Some([place(run), row.paper?.of_run(name)?])).collect();
-            let style = Style { marker: Marker::Diamond, fill: Fill::Open, size_px: 9.0, ..ours };
-            marks.push(Mark::new(format!("{}, paper", row.name), style, Shape::Points(printed)));
+            let printed = printed
+                .filter_map(|(run, name)| Some([place(run), row.paper?.of_run(name)?]))
+                .collect();
+            let style = Style {
+                marker: Marker::Diamond,
+                fill: Fill::Open,
+                size_px: 9.0,
+                ..ours
+            };
+            marks.push(Mark::new(
+                format!("{}, paper", row.name),
+                style,
+                Shape::Points(printed),
+            ));
         }
         let panel = Panel {
             x: Axis::categories("", self.runs.iter().map(|run| format!("run {run}"))),
@@ -96,6 +152,10 @@ impl Distances {
             marks,
             ..Panel::default()
         };
-        figures::single(&self.title, "Distances with the interval of the middle 95 % of the draws.", panel)
+        figures::single(
+            &self.title,
+            "Distances with the interval of the middle 95 % of the draws.",
+            panel,
+        )
     }
 }

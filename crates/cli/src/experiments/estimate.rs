@@ -41,10 +41,16 @@ impl Estimate {
 
     /// `{"<key>": mean, "low", "high", "first"}`.
     pub(crate) fn json(&self, key: &str) -> Value {
-        let Self { mean, low, high, first } = *self;
+        let Self {
+            mean,
+            low,
+            high,
+            first,
+        } = *self;
         let mut object = Map::new();
         object.insert(key.to_owned(), json!(mean));
-        object.extend([("low", low), ("high", high), ("first", first)].map(|(k, v)| (k.to_owned(), json!(v))));
+        object
+            .extend([("low", low), ("high", high), ("first", first)].map(|(k, v)| (k.to_owned(), json!(v))));
         Value::Object(object)
     }
 }
@@ -66,10 +72,12 @@ pub(crate) struct Tally {
 impl Tally {
     /// Counts the draws for which the answer is yes.
     pub(crate) fn of(answers: impl IntoIterator<Item = bool>) -> Self {
-        answers.into_iter().fold(Self { times: 0, draws: 0 }, |tally, yes| Self {
-            times: tally.times + usize::from(yes),
-            draws: tally.draws + 1,
-        })
+        answers
+            .into_iter()
+            .fold(Self { times: 0, draws: 0 }, |tally, yes| Self {
+                times: tally.times + usize::from(yes),
+                draws: tally.draws + 1,
+            })
     }
 
     /// Whether it was so in at least 95 % of the draws.
@@ -92,7 +100,10 @@ mod tests {
     fn an_interval_spans_the_middle_of_the_draws() {
         let values: Vec<f64> = (0..=40).rev().map(f64::from).collect();
         let estimate = Estimate::of(&values);
-        assert_eq!([estimate.mean, estimate.low, estimate.high, estimate.first], [20.0, 1.0, 39.0, 40.0]);
+        assert_eq!(
+            [estimate.mean, estimate.low, estimate.high, estimate.first],
+            [20.0, 1.0, 39.0, 40.0]
+        );
         assert_eq!(estimate.text(1), "20.0 [1.0, 39.0]");
         assert_eq!(Estimate::of(&[2.0]).text(2), "2.00");
     }

@@ -33,7 +33,9 @@ impl Difference {
 /// How far laps are from their mean lap: root mean square over laps and gates, m.
 pub(crate) fn spread_m(cluster: &Cluster) -> f64 {
     let (mean, laps) = (cluster.mean(), cluster.laps());
-    let squares = laps.row_iter().map(|lap| lap.iter().zip(&mean).map(|(a, b)| (a - b) * (a - b)).sum::<f64>());
+    let squares = laps
+        .row_iter()
+        .map(|lap| lap.iter().zip(&mean).map(|(a, b)| (a - b) * (a - b)).sum::<f64>());
     (squares.sum::<f64>() / ((laps.nrows() - 1).max(1) * laps.ncols()) as f64).sqrt()
 }
 
@@ -63,7 +65,12 @@ mod tests {
         let reference = Cluster::new("d", &[vec![1.0, -1.0, 2.0, 0.0]]).unwrap();
         let moved = Cluster::new("m", &[vec![4.0, 2.0, 5.0, 3.0], vec![4.0, 2.0, 5.0, 3.0]]).unwrap();
         let difference = Difference::new(&moved, &reference);
-        let is = [difference.rms_m, difference.offset_m, difference.shape_m, difference.correlation];
+        let is = [
+            difference.rms_m,
+            difference.offset_m,
+            difference.shape_m,
+            difference.correlation,
+        ];
         for (is, should) in is.iter().zip([3.0, 3.0, 0.0, 1.0]) {
             assert!((is - should).abs() < 1e-12, "{is} should be {should}");
         }

@@ -47,8 +47,18 @@ pub(crate) struct Picture {
 
 impl Picture {
     /// The figure as a block; its first sentence is the picture's title too.
-    pub(crate) fn block(file: &'static str, number: &'static str, caption: impl Into<String>, figure: Figure) -> Block {
-        Block::Picture(Box::new(Self { file, number, caption: caption.into(), figure }))
+    pub(crate) fn block(
+        file: &'static str,
+        number: &'static str,
+        caption: impl Into<String>,
+        figure: Figure,
+    ) -> Block {
+        Block::Picture(Box::new(Self {
+            file,
+            number,
+            caption: caption.into(),
+            figure,
+        }))
     }
 }
 
@@ -70,11 +80,21 @@ impl Claim {
         here: impl Into<String>,
         holds: bool,
     ) -> Self {
-        Self { claim: claim.into(), paper: paper.into(), here: here.into(), holds }
+        Self {
+            claim: claim.into(),
+            paper: paper.into(),
+            here: here.into(),
+            holds,
+        }
     }
 
     /// A claim that holds if it does in at least 95 % of the draws.
-    pub(crate) fn counted(claim: impl Into<String>, paper: impl Into<String>, here: &str, tally: Tally) -> Self {
+    pub(crate) fn counted(
+        claim: impl Into<String>,
+        paper: impl Into<String>,
+        here: &str,
+        tally: Tally,
+    ) -> Self {
         Self::new(claim, paper, format!("{here}; so in {tally}"), tally.holds())
     }
 
@@ -91,16 +111,37 @@ impl Claim {
 impl Section {
     /// The claims of the section.
     pub(crate) fn claims(&self) -> impl Iterator<Item = &Claim> {
-        self.blocks.iter().filter_map(|block| if let Block::Claims(claims) = block { Some(claims) } else { None }).flatten()
+        self.blocks
+            .iter()
+            .filter_map(|block| {
+                if let Block::Claims(claims) = block {
+                    Some(claims)
+                } else {
+                    None
+                }
+            })
+            .flatten()
     }
 
     /// The tables of the section.
     pub(crate) fn tables(&self) -> impl Iterator<Item = &Table> {
-        self.blocks.iter().filter_map(|block| if let Block::Table(table) = block { Some(table) } else { None })
+        self.blocks.iter().filter_map(|block| {
+            if let Block::Table(table) = block {
+                Some(table)
+            } else {
+                None
+            }
+        })
     }
 
     /// The figures of the section.
     pub(crate) fn pictures(&self) -> impl Iterator<Item = &Picture> {
-        self.blocks.iter().filter_map(|block| if let Block::Picture(picture) = block { Some(&**picture) } else { None })
+        self.blocks.iter().filter_map(|block| {
+            if let Block::Picture(picture) = block {
+                Some(&**picture)
+            } else {
+                None
+            }
+        })
     }
 }

@@ -10,7 +10,9 @@ pub(crate) struct Row(pub(crate) [f64; 4]);
 impl Row {
     /// The distance to a run, if the paper had a run of that name.
     pub(crate) fn of_run(&self, run: &str) -> Option<f64> {
-        RUNS.iter().position(|name| *name == run).map(|column| self.0[column])
+        RUNS.iter()
+            .position(|name| *name == run)
+            .map(|column| self.0[column])
     }
 
     /// The mean over the runs.

@@ -36,7 +36,13 @@ pub(crate) enum Variant {
 
 impl Variant {
     /// All but the standard one, which drives as many runs as the measured robot.
-    const OTHERS: [Self; 5] = [Self::OriginalSensor, Self::Wall1, Self::Wall10, Self::Wall50, Self::Slip100];
+    const OTHERS: [Self; 5] = [
+        Self::OriginalSensor,
+        Self::Wall1,
+        Self::Wall10,
+        Self::Wall50,
+        Self::Slip100,
+    ];
 
     /// The key of the model and the value that make it.
     fn setting(self) -> Option<(&'static str, &'static str)> {
@@ -115,7 +121,10 @@ impl Measurements {
     /// # Errors
     /// Two folders of one controller, or of different worlds; a run that cannot be read or sampled; fewer than two runs.
     pub(crate) fn load(folders: &[PathBuf]) -> Result<Self> {
-        let given = folders.iter().map(|folder| DataSet::load(folder)).collect::<Result<Vec<_>>>()?;
+        let given = folders
+            .iter()
+            .map(|folder| DataSet::load(folder))
+            .collect::<Result<Vec<_>>>()?;
         let of = |controller: ControllerKind| -> Result<DataSet> {
             let mut sets = given.iter().filter(|set| set.controller == Some(controller));
             match (sets.next(), sets.next()) {
@@ -134,10 +143,18 @@ impl Measurements {
         let measured = |set: DataSet| -> Result<Measured> {
             let measured = Measured::on(set, Arc::clone(&circuit))?;
             let (folder, runs) = (measured.set.folder.display(), measured.runs.len());
-            ensure!(runs >= 2, "{folder} has {runs} run; a run is compared with others of its controller, so two are needed");
+            ensure!(
+                runs >= 2,
+                "{folder} has {runs} run; a run is compared with others of its controller, so two are needed"
+            );
             Ok(measured)
         };
-        Ok(Self { braitenberg: measured(braitenberg)?, rule_based: measured(rule_based)?, circuit, world })
+        Ok(Self {
+            braitenberg: measured(braitenberg)?,
+            rule_based: measured(rule_based)?,
+            circuit,
+            world,
+        })
     }
 
     /// The declared model of the Braitenberg robot.
@@ -153,7 +170,10 @@ impl Measurements {
     /// Every file that was read.
     pub(crate) fn inputs(&self) -> Vec<Input> {
         let sets = [&self.rule_based.set, &self.braitenberg.set];
-        sets.into_iter().flat_map(|set| set.inputs.iter().cloned()).chain([self.world.clone()]).collect()
+        sets.into_iter()
+            .flat_map(|set| set.inputs.iter().cloned())
+            .chain([self.world.clone()])
+            .collect()
     }
 
     /// What a user must know of laps that are not there.
@@ -166,7 +186,9 @@ impl Measurements {
 /// The course that both data sets were driven on, with its gates.
 fn circuit(one: &DataSet, other: &DataSet) -> Result<(Arc<Circuit>, Input)> {
     let [(world, gates), (other_world, other_gates)] = [one, other].map(|set| {
-        let gates = set.declared_config(&Config::shipped()).map(|config| config.run.gates);
+        let gates = set
+            .declared_config(&Config::shipped())
+            .map(|config| config.run.gates);
         (set.world_source(None), gates)
     });
     let (world, gates) = (world?, gates?);
@@ -227,17 +249,41 @@ impl Study {
         let laps = measured.braitenberg.set.laps;
         let runs = (0..draws * plans.len()).into_par_iter().map(|number| {
             interrupt::check()?;
-            let run = simulate(&plans[number % plans.len()], Streams { seed, run: number as u64 }, laps)
-                .with_context(|| format!("draw {}", number / plans.len() + 1))?;
+            let run = simulate(
+                &plans[number % plans.len()],
+                Streams {
+                    seed,
+                    run: number as u64,
+                },
+                laps,
+            )
+            .with_context(|| format!("draw {}", number / plans.len() + 1))?;
             progress.tick(1);
-            Ok(Simulated { paths: if number < plans.len() { run.paths } else { Vec::new() }, ..run })
+            Ok(Simulated {
+                paths: if number < plans.len() {
+                    run.paths
+                } else {
+                    Vec::new()
+                },
+                ..run
+            })
         });
         let mut runs = runs.collect::<Result<Vec<_>>>()?.into_iter();
         let mut take = |count: usize| runs.by_ref().take(count).collect::<Vec<_>>();
-        let draw = |_| Draw { braitenberg: take(RUNS), rule_based: take(RUNS), others: take(Variant::OTHERS.len()) };
+        let draw = |_| Draw {
+            braitenberg: take(RUNS),
+            rule_based: take(RUNS),
+            others: take(Variant::OTHERS.len()),
+        };
         let draws = (0..draws).map(draw).collect();
         let real = measured.braitenberg.clusters()?;
-        Ok(Self { measured, standard, laps, draws, real })
+        Ok(Self {
+            measured,
+            standard,
+            laps,
+            draws,
+            real,
+        })
     }
 
     /// The course and its gates.
@@ -247,7 +293,12 @@ impl Study {
 
     /// The names of the measured Braitenberg runs.
     pub(crate) fn runs(&self) -> Vec<String> {
-        self.measured.braitenberg.runs.iter().map(|run| run.run.clone()).collect()
+        self.measured
+            .braitenberg
+            .runs
+            .iter()
+            .map(|run| run.run.clone())
+            .collect()
     }
 
     /// The places of the measured runs that the paper singles out, d and c; the last ones where there are no such names.
@@ -260,8 +311,13 @@ impl Study {
     /// The clusters of each draw: the measured runs of these places, then these variants.
     pub(crate) fn clusters(&self, real: &[usize], variants: &[Variant]) -> Vec<Vec<&Cluster>> {
         let of = |draw| {
-            let simulated = variants.iter().map(move |&variant| &Draw::run(draw, variant).cluster);
-            real.iter().map(|&place| &self.real[place]).chain(simulated).collect()
+            let simulated = variants
+                .iter()
+                .map(move |&variant| &Draw::run(draw, variant).cluster);
+            real.iter()
+                .map(|&place| &self.real[place])
+                .chain(simulated)
+                .collect()
         };
         self.draws.iter().map(of).collect()
     }
@@ -280,11 +336,24 @@ fn setups(standard: &Config, rule_based: &Config, circuit: &Arc<Circuit>) -> Res
 
 /// The runs of a draw in the order of [`Draw`].
 fn plans(setups: &[Setup]) -> Vec<Plan<'_>> {
-    let names = ["standard", "rule-based"].into_iter().chain(Variant::OTHERS.map(Variant::name));
-    let many = |count: usize, (setup, name)| (0..count).map(move |_| Plan { setup, name: String::from(name) });
+    let names = ["standard", "rule-based"]
+        .into_iter()
+        .chain(Variant::OTHERS.map(Variant::name));
+    let many = |count: usize, (setup, name)| {
+        (0..count).map(move |_| Plan {
+            setup,
+            name: String::from(name),
+        })
+    };
     let mut setups = setups.iter().zip(names);
-    let both = setups.by_ref().take(2).flat_map(|named| many(RUNS, named)).collect::<Vec<_>>();
-    both.into_iter().chain(setups.flat_map(|named| many(1, named))).collect()
+    let both = setups
+        .by_ref()
+        .take(2)
+        .flat_map(|named| many(RUNS, named))
+        .collect::<Vec<_>>();
+    both.into_iter()
+        .chain(setups.flat_map(|named| many(1, named)))
+        .collect()
 }
 
 fn simulate(plan: &Plan<'_>, streams: Streams, laps: usize) -> Result<Simulated> {

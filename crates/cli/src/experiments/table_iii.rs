@@ -4,7 +4,7 @@ use anyhow::Result;
 use chart::{Color, Dash, Figure, Panel, Side, Style};
 use serde_json::{Map, Value, json};
 
-use super::comparison::{Comparison, LEVEL, Space};
+use super::comparison::{Comparison, Space};
 use super::distances::{Distances, Row};
 use super::estimate::{Estimate, Tally};
 use super::mean_lap::Difference;
@@ -15,7 +15,12 @@ use crate::figures::{self, MM, Shown, across, line, map, measured, simulated, wa
 use crate::table::Table;
 
 /// In the order of [`WALLS`]: 1, 5, 10 and 50 mm.
-const VARIANTS: [Variant; 4] = [Variant::Wall1, Variant::Standard, Variant::Wall10, Variant::Wall50];
+const VARIANTS: [Variant; 4] = [
+    Variant::Wall1,
+    Variant::Standard,
+    Variant::Wall10,
+    Variant::Wall50,
+];
 const NAMES: [&str; 4] = ["error 1 mm", "error 5 mm", "error 10 mm", "error 50 mm"];
 
 /// The experiment: one PDM of all measured runs and one simulated run with each wall error.
@@ -52,8 +57,14 @@ pub(crate) fn outcome(study: &Study) -> Result<Outcome> {
         Block::Claims(claims),
     ];
     Ok(Outcome {
-        section: Section { heading: "Wall approximation (Table III)".into(), blocks },
-        csv: vec![("table_iii.csv", distances.csv())],
+        section: Section {
+            heading: "Wall approximation (Table III)".into(),
+            blocks,
+        },
+        csv: vec![
+            ("table_iii.csv", distances.csv()),
+            ("mean_laps.csv", shapes.table(study).to_csv()),
+        ],
         json: vec![("table_iii", distances.json()), ("wall_mean_laps", shapes.json())],
     })
 }
@@ -65,7 +76,9 @@ fn table_iii(study: &Study, comparison: &Comparison) -> Distances {
         key: error_m.to_string(),
         name: NAMES[place].into(),
         paper: Some(paper),
-        here: (0..runs).map(|run| comparison.distance(run, runs + place)).collect(), // eq. 8
+        here: (0..runs)
+            .map(|run| comparison.distance(run, runs + place))
+            .collect(), // eq. 8
     };
     Distances {
         title: "Table III: distances of the simulations to the measured runs".into(),
@@ -106,7 +119,7 @@ fn claims(study: &Study, comparison: &Comparison) -> Vec<Claim> {
             "With 1 and 5 mm there is a clear offset between simulated and measured clusters (every run, Hotelling's \
              test at 5 %)",
             "distances 4.6 to 16.5",
-            &format!("mean distances {:.1} and {:.1}, level {LEVEL}", means[0], means[1]),
+            &format!("mean distances over the runs {:.1} and {:.1}", means[0], means[1]),
             comparison.tally(|draw| (0..runs).all(|run| draw.differ(run, finest) && draw.differ(run, fine))),
         ),
         Claim::counted(
@@ -122,15 +135,28 @@ fn claims(study: &Study, comparison: &Comparison) -> Vec<Claim> {
 fn plane(study: &Study, comparison: &Comparison) -> Figure {
     let runs = study.runs();
     let shown = |(place, projection)| match runs.get(place) {
-        Some(run) => Shown { projection, label: format!("measured, run {run}"), style: measured(place) },
+        Some(run) => Shown {
+            projection,
+            label: format!("measured, run {run}"),
+            style: measured(place),
+        },
         None => {
             let wall = place - runs.len();
-            Shown { projection, label: NAMES[wall].into(), style: simulated(wall) }
+            Shown {
+                projection,
+                label: NAMES[wall].into(),
+                style: simulated(wall),
+            }
         }
     };
     let clusters: Vec<Shown<'_>> = comparison.projections.iter().enumerate().map(shown).collect();
     let near: Vec<usize> = (0..clusters.len() - 1).collect();
-    figures::plane_and_close_up("Four wall errors in the first two modes", &comparison.pdm, &clusters, &near)
+    figures::plane_and_close_up(
+        "Four wall errors in the first two modes",
+        &comparison.pdm,
+        &clusters,
+        &near,
+    )
 }
 
 /// Mean laps and cluster shapes against run d, draw by draw.
@@ -145,10 +171,17 @@ impl Shapes {
     fn new(study: &Study, comparison: &Comparison) -> Self {
         let (run, runs) = (study.run_named("d", 0), study.real.len());
         let difference = |variant: Variant| {
-            let of = |draw: &super::study::Draw| Difference::new(&draw.run(variant).cluster, &study.real[run]);
+            let of =
+                |draw: &super::study::Draw| Difference::new(&draw.run(variant).cluster, &study.real[run]);
             study.draws.iter().map(of).collect()
         };
-        let contrast = |wall: usize| comparison.draws.iter().map(|draw| draw.pair(run, runs + wall).contrast).collect();
+        let contrast = |wall: usize| {
+            comparison
+                .draws
+                .iter()
+                .map(|draw| draw.pair(run, runs + wall).contrast)
+                .collect()
+        };
         Self {
             differences: VARIANTS.into_iter().map(difference).collect(),
             contrasts: (0..VARIANTS.len()).map(contrast).collect(),
@@ -166,8 +199,17 @@ impl Shapes {
     fn table(&self, study: &Study) -> Table {
         let run = &study.runs()[study.run_named("d", 0)];
         let title = format!("Mean laps against that of run {run}, and cluster shapes against its shape");
-        let mut table =
-            Table::new(title, &["simulation", "rms, mm", "offset, mm", "without offset, mm", "correlation", "shape contrast"]);
+        let mut table = Table::new(
+            title,
+            &[
+                "simulation",
+                "rms, mm",
+                "offset, mm",
+                "without offset, mm",
+                "correlation",
+                "shape contrast",
+            ],
+        );
         for (wall, name) in NAMES.iter().enumerate() {
             table.push([
                 (*name).to_owned(),
@@ -217,7 +259,12 @@ impl Shapes {
                      the covariances, 0 where they are equal)"
                 ),
                 "seen in Fig. 11",
-                &format!("{} and {} against {}", contrast(finest), contrast(fine), contrast(middle)),
+                &format!(
+                    "{} and {} against {}",
+                    contrast(finest),
+                    contrast(fine),
+                    contrast(middle)
+                ),
                 self.tally(|draw| {
                     let [a, b, c] = [finest, fine, middle].map(|wall| self.contrasts[wall][draw]);
                     a.max(b) < c
@@ -226,8 +273,15 @@ impl Shapes {
             Claim::counted(
                 format!("With 50 mm the mean lap differs most from that of run {run}"),
                 "seen in Fig. 12",
-                &format!("{} mm rms against {} with 1 mm and {} with 10 mm", rms(coarse), rms(finest), rms(middle)),
-                self.tally(|draw| is(coarse, draw).rms_m > is(finest, draw).rms_m.max(is(middle, draw).rms_m)),
+                &format!(
+                    "{} mm rms against {} with 1 mm and {} with 10 mm",
+                    rms(coarse),
+                    rms(finest),
+                    rms(middle)
+                ),
+                self.tally(|draw| {
+                    is(coarse, draw).rms_m > is(finest, draw).rms_m.max(is(middle, draw).rms_m)
+                }),
             ),
             Claim::counted(
                 format!("The mean lap of 10 mm is closer to that of run {run} than the one of 1 mm"),
@@ -253,10 +307,18 @@ fn mean_laps_figure(study: &Study) -> Figure {
     let draw = &study.draws[0];
     let simulated = |wall: usize, color: Color, dash: Dash| {
         let style = line(color, dash, 1.4);
-        (NAMES[wall].to_owned(), draw.run(VARIANTS[wall]).cluster.mean(), style)
+        (
+            NAMES[wall].to_owned(),
+            draw.run(VARIANTS[wall]).cluster.mean(),
+            style,
+        )
     };
     let curves = vec![
-        (format!("measured, run {}", study.runs()[run]), study.real[run].mean(), line(Color::INK, Dash::Solid, 2.0)),
+        (
+            format!("measured, run {}", study.runs()[run]),
+            study.real[run].mean(),
+            line(Color::INK, Dash::Solid, 2.0),
+        ),
         simulated(0, Color::BLUE, Dash::Solid),
         simulated(2, Color::GREEN, Dash::Dashed),
         simulated(3, Color::VERMILLION, Dash::DashDot),
@@ -266,13 +328,22 @@ fn mean_laps_figure(study: &Study) -> Figure {
         points.push(points[0]);
         figures::paths(label, *style, &[points])
     };
-    let marks = std::iter::once(walls(&study.circuit().course)).chain(curves.iter().map(lap)).collect();
+    let marks = std::iter::once(walls(&study.circuit().course))
+        .chain(curves.iter().map(lap))
+        .collect();
     Figure {
         title: "Mean laps".into(),
         description: "Mean laps on the course, and their positions across the track gate by gate.".into(),
         panels: vec![
-            Panel { size_px: [420.0, 360.0], ..map("on the course", marks) },
-            Panel { size_px: [420.0, 360.0], title: "across the track".into(), ..across(&curves) },
+            Panel {
+                size_px: [420.0, 360.0],
+                ..map("on the course", marks)
+            },
+            Panel {
+                size_px: [420.0, 360.0],
+                title: "across the track".into(),
+                ..across(&curves)
+            },
         ],
         columns: 2,
         legend: Side::Below,

@@ -2,6 +2,7 @@
 
 use nalgebra::DVector;
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 use sim::Setting;
 
 use super::expectation::{Expectation, Scatter};
@@ -56,11 +57,22 @@ impl Atlas {
         let scatter = Scatter::of(null.iter()).ok_or(Error::TooFewLaps)?;
         let laps: Vec<usize> = null[0].runs.iter().map(|run| run.laps).collect();
         let samples = null.iter().map(observed).collect();
-        let mut atlas = Self { null: expectation, scatter, samples, laps, probes: probes(), paths: Vec::new() };
+        let mut atlas = Self {
+            null: expectation,
+            scatter,
+            samples,
+            laps,
+            probes: probes(),
+            paths: Vec::new(),
+        };
         let same_draws = Expectation::of(null[..PROBE_SETS as usize].iter(), true);
         drop(null);
-        let jobs: Vec<(usize, usize)> =
-            atlas.probes.iter().enumerate().flat_map(|(p, probe)| (0..probe.sizes.len()).map(move |k| (p, k))).collect();
+        let jobs: Vec<(usize, usize)> = atlas
+            .probes
+            .iter()
+            .enumerate()
+            .flat_map(|(p, probe)| (0..probe.sizes.len()).map(move |k| (p, k)))
+            .collect();
         let points: Vec<Option<White>> = jobs
             .par_iter()
             .map(|&(p, k)| {
@@ -75,8 +87,46 @@ impl Atlas {
             })
             .collect();
         let mut points = points.into_iter();
-        atlas.paths = atlas.probes.iter().map(|probe| points.by_ref().take(probe.sizes.len()).collect()).collect();
+        atlas.paths = atlas
+            .probes
+            .iter()
+            .map(|probe| points.by_ref().take(probe.sizes.len()).collect())
+            .collect();
         Ok(atlas)
+    }
+
+    /// The atlas as bytes, for a cache.
+    pub fn to_bytes(&self) -> Vec<u8> {
+        postcard::to_stdvec(&Stored {
+            probes: fingerprint(&self.probes),
+            null: self.null.clone(),
+            scatter: self.scatter.clone(),
+            samples: self.samples.clone(),
+            laps: self.laps.clone(),
+            paths: self.paths.clone(),
+        })
+        .expect("numbers and lists have a form as bytes")
+    }
+
+    /// The atlas of [`Atlas::to_bytes`]; `None` for bytes that are none, or that were made with other probes.
+    pub fn from_bytes(bytes: &[u8]) -> Option<Self> {
+        let Stored {
+            probes: made_with,
+            null,
+            scatter,
+            samples,
+            laps,
+            paths,
+        } = postcard::from_bytes(bytes).ok()?;
+        let probes = probes();
+        (made_with == fingerprint(&probes)).then_some(Self {
+            null,
+            scatter,
+            samples,
+            laps,
+            probes,
+            paths,
+        })
     }
 
     /// Number of data sets that [`Atlas::new`] simulates.
@@ -96,13 +146,38 @@ impl Atlas {
     }
 }
 
+/// What a cache holds of an atlas.
+#[derive(Serialize, Deserialize)]
+struct Stored {
+    probes: String,
+    null: Expectation,
+    scatter: Scatter,
+    samples: Vec<Expectation>,
+    laps: Vec<usize>,
+    paths: Vec<Vec<Option<White>>>,
+}
+
+/// What tells two lists of probes apart.
+fn fingerprint(probes: &[Probe]) -> String {
+    probes
+        .iter()
+        .map(|probe| format!("{} {:?};", probe.label(), probe.sizes))
+        .collect()
+}
+
 /// The difference of two expectations in units of a scatter.
 pub(super) fn white(scatter: &Scatter, laps: &[usize], to: &Expectation, from: &Expectation) -> White {
-    let runs = laps.iter().enumerate().map(|(r, &n)| scatter.whiten(&(&to.means[r] - &from.means[r])) * (n as f64).sqrt());
+    let runs = laps
+        .iter()
+        .enumerate()
+        .map(|(r, &n)| scatter.whiten(&(&to.means[r] - &from.means[r])) * (n as f64).sqrt());
     let trend = scatter.whiten(&(&to.trend - &from.trend)) * (laps.len() as f64).sqrt();
     let second = scatter.whiten_second(&(&to.second - &from.second));
     let parts: Vec<DVector<f64>> = runs.chain([trend, second]).collect();
-    DVector::from_iterator(parts.iter().map(|p| p.len()).sum(), parts.iter().flat_map(|p| p.iter().copied()))
+    DVector::from_iterator(
+        parts.iter().map(|p| p.len()).sum(),
+        parts.iter().flat_map(|p| p.iter().copied()),
+    )
 }
 
 /// What one data set says, in the form of an expectation: its runs are not pooled.

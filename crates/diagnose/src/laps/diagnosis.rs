@@ -1,6 +1,7 @@
 //! The answer: which effects, how sure, what else it could be.
 
 use rayon::prelude::*;
+use sim::Setting;
 
 use super::atlas::{Atlas, Simulate, White, observed};
 use super::expectation::Expectation;
@@ -44,6 +45,7 @@ pub struct Explanation {
     pub effects: Vec<Candidate>,
     /// What they are, for a reader.
     pub label: String,
+    hypothesis: Hypothesis,
     /// Log-likelihood gained over the declared model less the price of the fitted numbers.
     pub score: f64,
     /// Log-likelihood gained.
@@ -60,9 +62,17 @@ impl Explanation {
         self.remainder.omnibus_p() >= SIGNIFICANT_P || self.share >= ENOUGH
     }
 
+    /// The effects as the simulator takes them.
+    pub fn settings(&self) -> Vec<Setting> {
+        self.effects.iter().map(|effect| effect.setting.clone()).collect()
+    }
+
     /// The effects' names.
     pub fn names(&self) -> Vec<&'static str> {
-        self.effects.iter().map(|effect| effect.setting.spec.name).collect()
+        self.effects
+            .iter()
+            .map(|effect| effect.setting.spec.name)
+            .collect()
     }
 }
 
@@ -77,6 +87,8 @@ pub struct Diagnosis {
     pub explanations: Vec<Explanation>,
     /// How many of these the data do not tell apart, from the first on.
     pub indistinguishable: usize,
+    /// For each run the answer's effects with sizes fitted to the other runs alone.
+    pub left_out: Vec<Vec<Setting>>,
 }
 
 impl Atlas {
@@ -92,11 +104,25 @@ impl Atlas {
         let screened = self.screen(&residual);
         let alarm = numbers.omnibus_p() < ALARM_P || self.best_score(&residual) > ALARM_SCORE;
         if !alarm {
-            return Ok(Diagnosis { verdict: Verdict::Faithful, residual: numbers, explanations: Vec::new(), indistinguishable: 0 });
+            return Ok(Diagnosis {
+                verdict: Verdict::Faithful,
+                residual: numbers,
+                explanations: Vec::new(),
+                indistinguishable: 0,
+                left_out: vec![Vec::new(); runs.len()],
+            });
         }
-        let search = Search { atlas: self, simulate, data: &data, residual: &residual };
+        let search = Search {
+            atlas: self,
+            simulate,
+            data: &data,
+            residual: &residual,
+        };
         let mut explanations = search.singles(&screened);
-        if explanations.first().is_none_or(|best| best.remainder.omnibus_p() < SIGNIFICANT_P) {
+        if explanations
+            .first()
+            .is_none_or(|best| best.remainder.omnibus_p() < SIGNIFICANT_P)
+        {
             let pairs = search.pairs();
             explanations = search.weigh(explanations, pairs);
         }
@@ -106,9 +132,24 @@ impl Atlas {
             _ => Verdict::Unexplained,
         };
         let indistinguishable = explanations.first().map_or(0, |best| {
-            explanations.iter().take_while(|e| e.score > best.score - ALTERNATIVE && e.effects.len() == best.effects.len()).count()
+            explanations
+                .iter()
+                .take_while(|e| e.score > best.score - ALTERNATIVE && e.effects.len() == best.effects.len())
+                .count()
         });
-        Ok(Diagnosis { verdict, residual: numbers, explanations, indistinguishable })
+        let answer = explanations.first().filter(|_| verdict != Verdict::Unexplained);
+        let left_out = match answer {
+            Some(answer) if runs.len() > 1 => self.leave_out(simulate, runs, &answer.hypothesis)?,
+            Some(answer) => vec![answer.settings(); runs.len()],
+            None => vec![Vec::new(); runs.len()],
+        };
+        Ok(Diagnosis {
+            verdict,
+            residual: numbers,
+            explanations,
+            indistinguishable,
+            left_out,
+        })
     }
 }
 
@@ -143,7 +184,10 @@ impl Search<'_> {
             .par_iter()
             .filter_map(|start| self.atlas.descend(self.simulate, self.data, start, ROUNDS))
             .collect();
-        let best = descended.iter().map(|d| d.score).fold(f64::NEG_INFINITY, f64::max);
+        let best = descended
+            .iter()
+            .map(|d| d.score)
+            .fold(f64::NEG_INFINITY, f64::max);
         let mut explanations: Vec<Explanation> = descended
             .par_iter()
             .filter(|d| d.score >= best - BEHIND.max(0.02 * best))
@@ -177,21 +221,32 @@ impl Search<'_> {
             .map(|(part, setting)| {
                 let errors: Vec<f64> = refined.errors_of(part, atlas);
                 let fitted = errors.iter().filter(|e| **e > 0.0).count();
-                Candidate { setting, standard_errors: errors, gain: refined.gain, fitted }
+                Candidate {
+                    setting,
+                    standard_errors: errors,
+                    gain: refined.gain,
+                    fitted,
+                }
             })
             .collect();
-        let labels: Vec<String> = refined.hypothesis.parts.iter().map(|part| {
-            let pattern = match part.shape {
-                Shape::Constant => "",
-                Shape::ByRun => ", by run",
-                Shape::ByTime => ", by time",
-            };
-            atlas.probes[part.probe].label() + pattern
-        }).collect();
+        let labels: Vec<String> = refined
+            .hypothesis
+            .parts
+            .iter()
+            .map(|part| {
+                let pattern = match part.shape {
+                    Shape::Constant => "",
+                    Shape::ByRun => ", by run",
+                    Shape::ByTime => ", by time",
+                };
+                atlas.probes[part.probe].label() + pattern
+            })
+            .collect();
         let excess = |squares: f64| squares - self.residual.len() as f64;
         Explanation {
             effects,
             label: labels.join(" + "),
+            hypothesis: refined.hypothesis.clone(),
             score: refined.score,
             gain: refined.gain,
             share: 1.0 - excess(refined.residual.norm_squared()) / excess(self.residual.norm_squared()),
@@ -204,7 +259,9 @@ impl Search<'_> {
 fn shortlist(screened: &[Screened]) -> Vec<&Screened> {
     const MOST: usize = 7;
     const OF_ONE_EFFECT: usize = 2;
-    let Some(best) = screened.first() else { return Vec::new() };
+    let Some(best) = screened.first() else {
+        return Vec::new();
+    };
     let mut list: Vec<&Screened> = Vec::new();
     for candidate in screened {
         let probe = candidate.hypothesis.parts[0].probe;

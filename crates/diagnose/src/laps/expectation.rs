@@ -1,13 +1,14 @@
 //! What a model leads one to expect of a data set, by simulation.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use serde::{Deserialize, Serialize};
 
 use super::summary::{SECOND, Summary};
 
 /// Means of the summaries of simulated data sets.
 ///
 /// A model whose runs are alike (`alike`) expects the same of each, so their summaries are pooled.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub(super) struct Expectation {
     /// Mean lap of each run.
     pub(super) means: Vec<DVector<f64>>,
@@ -20,7 +21,10 @@ pub(super) struct Expectation {
 impl Expectation {
     /// The mean of several summaries of the same shape.
     pub(super) fn of<'a>(summaries: impl Iterator<Item = &'a Summary> + Clone, alike: bool) -> Self {
-        let first = summaries.clone().next().expect("at least one data set is simulated");
+        let first = summaries
+            .clone()
+            .next()
+            .expect("at least one data set is simulated");
         let (runs, size) = (first.runs.len(), first.runs[0].mean.len());
         let sets = summaries.clone().count() as f64;
         let mut means = vec![DVector::zeros(size); runs];
@@ -54,7 +58,11 @@ impl Expectation {
 
     fn zero(&self) -> Self {
         let zero = |v: &DVector<f64>| DVector::zeros(v.len());
-        Self { means: self.means.iter().map(zero).collect(), trend: zero(&self.trend), second: zero(&self.second) }
+        Self {
+            means: self.means.iter().map(zero).collect(),
+            trend: zero(&self.trend),
+            second: zero(&self.second),
+        }
     }
 
     /// Gives all runs the mean of their means.
@@ -67,7 +75,9 @@ impl Expectation {
     pub(super) fn moved(&self, factor: f64, from: &Self, to: &Self) -> Self {
         let moved = |base: &DVector<f64>, a: &DVector<f64>, b: &DVector<f64>| base + (b - a) * factor;
         Self {
-            means: (0..self.means.len()).map(|r| moved(&self.means[r], &from.means[r], &to.means[r])).collect(),
+            means: (0..self.means.len())
+                .map(|r| moved(&self.means[r], &from.means[r], &to.means[r]))
+                .collect(),
             trend: moved(&self.trend, &from.trend, &to.trend),
             second: moved(&self.second, &from.second, &to.second),
         }
@@ -75,7 +85,7 @@ impl Expectation {
 }
 
 /// How a data set scatters about its expectation: the covariance of one lap and of the second-order numbers.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub(super) struct Scatter {
     lap: Cholesky<f64, Dyn>,
     second: Cholesky<f64, Dyn>,
@@ -101,7 +111,10 @@ impl Scatter {
 
     /// The scatter of the laps of these data sets, with another's scatter of the second-order numbers, which few data sets
     /// do not determine.
-    pub(super) fn of_laps<'a>(summaries: impl Iterator<Item = &'a Summary> + Clone, other: &Self) -> Option<Self> {
+    pub(super) fn of_laps<'a>(
+        summaries: impl Iterator<Item = &'a Summary> + Clone,
+        other: &Self,
+    ) -> Option<Self> {
         Self::with_second(summaries, other.second.clone())
     }
 

@@ -64,15 +64,30 @@ impl Part {
         let p = &atlas.probes[probe];
         let clamped = |size: f64| p.clamped(&p.values(p.quantum.map_or(size, |q| (size / q).round() * q)));
         match shape {
-            Shape::Constant => Self { probe, shape, values: vec![clamped(sizes[0])], per_s: 0.0 },
-            Shape::ByRun => Self { probe, shape, values: sizes.iter().map(|&s| clamped(s)).collect(), per_s: 0.0 },
+            Shape::Constant => Self {
+                probe,
+                shape,
+                values: vec![clamped(sizes[0])],
+                per_s: 0.0,
+            },
+            Shape::ByRun => Self {
+                probe,
+                shape,
+                values: sizes.iter().map(|&s| clamped(s)).collect(),
+                per_s: 0.0,
+            },
             Shape::ByTime => {
                 let steps = ramp(atlas.laps[0]);
                 let per_lap = sizes[1] * (steps[1] - steps[0]);
                 let per_s = per_lap / atlas.lap_s();
                 // The kept laps begin one and a half laps after the run, on average.
                 let middle_s = (1.5 + atlas.laps[0] as f64 / 2.0) * atlas.lap_s();
-                Self { probe, shape, values: vec![clamped(sizes[0] - per_s * middle_s)], per_s }
+                Self {
+                    probe,
+                    shape,
+                    values: vec![clamped(sizes[0] - per_s * middle_s)],
+                    per_s,
+                }
             }
         }
     }
@@ -84,10 +99,16 @@ impl Part {
             Shape::ByTime => {
                 let mut per_s = vec![0.0; self.values[0].len()];
                 per_s[probe.free[0].0] = self.per_s;
-                Pattern::ByTime { start: self.values[0].clone(), per_s }
+                Pattern::ByTime {
+                    start: self.values[0].clone(),
+                    per_s,
+                }
             }
         };
-        Setting { spec: probe.spec, pattern }
+        Setting {
+            spec: probe.spec,
+            pattern,
+        }
     }
 
     /// Standard errors in the order of the pattern's values: run after run, or start values and then slopes.
@@ -114,14 +135,29 @@ impl Part {
         for (i, &(parameter, step)) in probe.free.iter().enumerate() {
             let parameter = Some(parameter);
             if i == 0 && self.shape == Shape::ByRun {
-                freedoms.extend((0..runs).map(|run| Freedom { part, run: Some(run), parameter, step }));
+                freedoms.extend((0..runs).map(|run| Freedom {
+                    part,
+                    run: Some(run),
+                    parameter,
+                    step,
+                }));
             } else {
-                freedoms.push(Freedom { part, run: None, parameter, step });
+                freedoms.push(Freedom {
+                    part,
+                    run: None,
+                    parameter,
+                    step,
+                });
             }
         }
         if self.shape == Shape::ByTime {
             let run_s = atlas.laps[0] as f64 * atlas.lap_s();
-            freedoms.push(Freedom { part, run: None, parameter: None, step: probe.free[0].1 / run_s });
+            freedoms.push(Freedom {
+                part,
+                run: None,
+                parameter: None,
+                step: probe.free[0].1 / run_s,
+            });
         }
         freedoms
     }
@@ -130,7 +166,10 @@ impl Part {
 impl Hypothesis {
     /// The effects as the simulator takes them.
     pub(super) fn settings(&self, atlas: &Atlas) -> Vec<Setting> {
-        self.parts.iter().map(|part| part.setting(&atlas.probes[part.probe])).collect()
+        self.parts
+            .iter()
+            .map(|part| part.setting(&atlas.probes[part.probe]))
+            .collect()
     }
 
     /// Whether all runs are alike.
@@ -140,13 +179,31 @@ impl Hypothesis {
 
     /// The numbers that a fit may change.
     pub(super) fn freedoms(&self, atlas: &Atlas) -> Vec<Freedom> {
-        self.parts.iter().enumerate().flat_map(|(i, part)| part.freedoms(i, atlas)).collect()
+        self.parts
+            .iter()
+            .enumerate()
+            .flat_map(|(i, part)| part.freedoms(i, atlas))
+            .collect()
+    }
+
+    /// This hypothesis with the sizes of one run replaced by the mean of the other runs', where they go by run.
+    pub(super) fn with_mean_size(mut self, run: usize) -> Self {
+        for part in self.parts.iter_mut().filter(|part| part.values.len() > 1) {
+            let others = part.values.len() as f64 - 1.0;
+            for i in 0..part.values[run].len() {
+                let sum: f64 = part.values.iter().map(|values| values[i]).sum();
+                part.values[run][i] = (sum - part.values[run][i]) / others;
+            }
+        }
+        self
     }
 
     /// The value of one number.
     pub(super) fn get(&self, freedom: &Freedom) -> f64 {
         let part = &self.parts[freedom.part];
-        freedom.parameter.map_or(part.per_s, |i| part.values[freedom.run.unwrap_or(0)][i])
+        freedom
+            .parameter
+            .map_or(part.per_s, |i| part.values[freedom.run.unwrap_or(0)][i])
     }
 
     /// This hypothesis with some numbers moved; each stays in its parameter's range.

@@ -31,7 +31,9 @@ impl Atlas {
     /// Their actions are taken to add up. Looking for both at once finds what one after the other does not: the best
     /// single explanation of two effects is often a third.
     pub(super) fn screen_pairs(&self, residual: &White, most: usize) -> Vec<ScreenedPair> {
-        let pieces: Vec<Piece> = (0..self.probes.len()).flat_map(|probe| self.pieces(probe)).collect();
+        let pieces: Vec<Piece> = (0..self.probes.len())
+            .flat_map(|probe| self.pieces(probe))
+            .collect();
         let along = DMatrix::from_columns(&pieces.iter().map(|p| p.along.clone()).collect::<Vec<_>>());
         let from = DMatrix::from_columns(&pieces.iter().map(|p| p.from.clone()).collect::<Vec<_>>());
         let products = Products {
@@ -41,15 +43,19 @@ impl Atlas {
             along_target: along.tr_mul(residual),
             from_target: from.tr_mul(residual),
         };
-        let mut best: std::collections::BTreeMap<(usize, usize), (f64, [f64; 2])> = std::collections::BTreeMap::new();
+        let mut best: std::collections::BTreeMap<(usize, usize), (f64, [f64; 2])> =
+            std::collections::BTreeMap::new();
         for (i, a) in pieces.iter().enumerate() {
             for (j, b) in pieces.iter().enumerate().skip(i + 1) {
                 if self.probes[a.probe].spec == self.probes[b.probe].spec {
                     continue;
                 }
                 let (gain, shares) = products.best([i, j], [a, b]);
-                let sizes = [(a, shares[0]), (b, shares[1])].map(|(p, share)| p.from_size + share * (p.to_size - p.from_size));
-                let entry = best.entry((a.probe, b.probe)).or_insert((f64::NEG_INFINITY, sizes));
+                let sizes = [(a, shares[0]), (b, shares[1])]
+                    .map(|(p, share)| p.from_size + share * (p.to_size - p.from_size));
+                let entry = best
+                    .entry((a.probe, b.probe))
+                    .or_insert((f64::NEG_INFINITY, sizes));
                 if gain > entry.0 {
                     *entry = (gain, sizes);
                 }
@@ -61,8 +67,13 @@ impl Atlas {
             .map(|((a, b), (gain, sizes))| {
                 let fitted = self.probes[a].free.len() + self.probes[b].free.len();
                 let part = |probe, size| Part::screened(self, probe, Shape::Constant, &[size]);
-                let hypothesis = Hypothesis { parts: vec![part(a, sizes[0]), part(b, sizes[1])] };
-                ScreenedPair { hypothesis, score: 0.5 * gain - price(fitted, laps) }
+                let hypothesis = Hypothesis {
+                    parts: vec![part(a, sizes[0]), part(b, sizes[1])],
+                };
+                ScreenedPair {
+                    hypothesis,
+                    score: 0.5 * gain - price(fitted, laps),
+                }
             })
             .collect();
         pairs.sort_by(|a, b| b.score.total_cmp(&a.score));
@@ -103,12 +114,19 @@ impl Products {
         // target - from_i - from_j, seen along each piece.
         let seen = |k: usize| self.along_target[k] - self.along_from[(k, i)] - self.along_from[(k, j)];
         let g = [seen(i), seen(j)];
-        let [a, b, c] = [self.along_along[(i, i)], self.along_along[(j, j)], self.along_along[(i, j)]];
+        let [a, b, c] = [
+            self.along_along[(i, i)],
+            self.along_along[(j, j)],
+            self.along_along[(i, j)],
+        ];
         let clamp = |k: usize, share: f64| share.clamp(pieces[k].low, pieces[k].high);
         let determinant = a * b - c * c;
         let mut shares = [0.0, 0.0];
         if determinant > 1e-9 * a * b {
-            shares = [(b * g[0] - c * g[1]) / determinant, (a * g[1] - c * g[0]) / determinant];
+            shares = [
+                (b * g[0] - c * g[1]) / determinant,
+                (a * g[1] - c * g[0]) / determinant,
+            ];
         }
         // Within the bounds a few turns of coordinate descent end at the constrained minimum.
         for _ in 0..4 {

@@ -25,17 +25,28 @@ pub(super) struct Probe {
 impl Probe {
     /// The values of all parameters at a size.
     pub(super) fn values(&self, size: f64) -> Vec<f64> {
-        self.origin.iter().zip(&self.direction).map(|(o, d)| o + d * (size - self.neutral)).collect()
+        self.origin
+            .iter()
+            .zip(&self.direction)
+            .map(|(o, d)| o + d * (size - self.neutral))
+            .collect()
     }
 
     /// The effect at a size.
     pub(super) fn setting(&self, size: f64) -> Setting {
-        Setting { spec: self.spec, pattern: Pattern::Constant(self.values(size)) }
+        Setting {
+            spec: self.spec,
+            pattern: Pattern::Constant(self.values(size)),
+        }
     }
 
     /// Values brought into their parameters' ranges.
     pub(super) fn clamped(&self, values: &[f64]) -> Vec<f64> {
-        values.iter().zip(self.spec.params).map(|(v, p)| v.clamp(p.low, p.high)).collect()
+        values
+            .iter()
+            .zip(self.spec.params)
+            .map(|(v, p)| v.clamp(p.low, p.high))
+            .collect()
     }
 
     /// What tells this probe from others of the same effect, for a reader.
@@ -48,7 +59,11 @@ impl Probe {
                 None => format!("{} {value:.3}", param.name),
             })
             .collect();
-        if fixed.is_empty() { self.spec.name.to_owned() } else { format!("{} ({})", self.spec.name, fixed.join(", ")) }
+        if fixed.is_empty() {
+            self.spec.name.to_owned()
+        } else {
+            format!("{} ({})", self.spec.name, fixed.join(", "))
+        }
     }
 }
 
@@ -61,7 +76,12 @@ fn line(name: &str, sizes: &[f64]) -> Vec<Probe> {
 /// parameters that a fit may change, with their steps.
 fn probe(name: &str, fixed: &[(&str, f64)], sizes: &[f64], free: &[(&str, f64)]) -> Vec<Probe> {
     let Ok(spec) = find(name) else { return Vec::new() };
-    let index = |key: &str| spec.params.iter().position(|p| p.name == key).expect("probes name parameters");
+    let index = |key: &str| {
+        spec.params
+            .iter()
+            .position(|p| p.name == key)
+            .expect("probes name parameters")
+    };
     let size_index = spec
         .params
         .iter()
@@ -79,8 +99,20 @@ fn probe(name: &str, fixed: &[(&str, f64)], sizes: &[f64], free: &[(&str, f64)])
     direction[size_index] = 1.0;
     let reach = sizes.iter().map(|s| (s - neutral).abs()).fold(0.0, f64::max);
     let steps = [(size_index, 0.15 * reach)];
-    let free = steps.into_iter().chain(free.iter().map(|(key, step)| (index(key), *step))).collect();
-    vec![Probe { spec, origin, direction, sizes: sizes.to_vec(), neutral, free, odd: false, quantum: None }]
+    let free = steps
+        .into_iter()
+        .chain(free.iter().map(|(key, step)| (index(key), *step)))
+        .collect();
+    vec![Probe {
+        spec,
+        origin,
+        direction,
+        sizes: sizes.to_vec(),
+        neutral,
+        free,
+        odd: false,
+        quantum: None,
+    }]
 }
 
 /// A vector of two parameters, in four directions; both are fitted.
@@ -89,7 +121,14 @@ fn vector(name: &str, keys: [&str; 2], sizes: &[f64]) -> Vec<Probe> {
     let mut probes = Vec::new();
     for (a, b) in [(1.0, 0.0), (h, h), (0.0, 1.0), (-h, h)] {
         for mut probe in probe(name, &[], sizes, &[]) {
-            let index = |key: &str| probe.spec.params.iter().position(|p| p.name == key).expect("probes name parameters");
+            let index = |key: &str| {
+                probe
+                    .spec
+                    .params
+                    .iter()
+                    .position(|p| p.name == key)
+                    .expect("probes name parameters")
+            };
             let (i, j) = (index(keys[0]), index(keys[1]));
             probe.direction.fill(0.0);
             (probe.direction[i], probe.direction[j]) = (a, b);
@@ -104,12 +143,17 @@ fn vector(name: &str, keys: [&str; 2], sizes: &[f64]) -> Vec<Probe> {
 /// A size with a direction, in eight of them; both are fitted.
 fn directed(name: &str, sizes: &[f64]) -> Vec<Probe> {
     let azimuths = (0..8).map(|k| f64::from(k) * std::f64::consts::FRAC_PI_4 - std::f64::consts::PI);
-    azimuths.flat_map(|azimuth| probe(name, &[("azimuth_rad", azimuth)], sizes, &[("azimuth_rad", 0.15)])).collect()
+    azimuths
+        .flat_map(|azimuth| probe(name, &[("azimuth_rad", azimuth)], sizes, &[("azimuth_rad", 0.15)]))
+        .collect()
 }
 
 /// One of the six sensors that the controllers use.
 fn sensors(name: &str, sizes: &[f64]) -> Vec<Probe> {
-    [0.0, 1.0, 2.0, 5.0, 6.0, 7.0].into_iter().flat_map(|s| probe(name, &[("sensor", s)], sizes, &[])).collect()
+    [0.0, 1.0, 2.0, 5.0, 6.0, 7.0]
+        .into_iter()
+        .flat_map(|s| probe(name, &[("sensor", s)], sizes, &[]))
+        .collect()
 }
 
 /// A place on one of the walls; place, length and size are fitted.
@@ -121,7 +165,11 @@ fn places(name: &str, length_m: f64, size: f64) -> Vec<Probe> {
             let position = (f64::from(k) + 0.5) / f64::from(PLACES);
             let fixed = [("wall", wall), ("position", position), ("length_m", length_m)];
             let free = [("position", 0.008), ("length_m", 0.015)];
-            probes.extend(probe(name, &fixed, &[size], &free).into_iter().map(|p| Probe { odd: true, ..p }));
+            probes.extend(
+                probe(name, &fixed, &[size], &free)
+                    .into_iter()
+                    .map(|p| Probe { odd: true, ..p }),
+            );
         }
     }
     probes
@@ -131,7 +179,10 @@ fn places(name: &str, length_m: f64, size: f64) -> Vec<Probe> {
 ///
 /// `controller-speed` is not among them, because laps cannot tell it from `wheel-scale`.
 pub(super) fn probes() -> Vec<Probe> {
-    let delay = |p: Probe| Probe { quantum: Some(0.032), ..p };
+    let delay = |p: Probe| Probe {
+        quantum: Some(0.032),
+        ..p
+    };
     let steps: Vec<f64> = (1..=15).map(|k| 0.002 * f64::from(k)).collect();
     let delays: Vec<f64> = (1..=10).map(|k| 0.032 * f64::from(k)).collect();
     [
@@ -148,7 +199,10 @@ pub(super) fn probes() -> Vec<Probe> {
         line("crosstalk", &[0.02, 0.06, 0.12, 0.2]),
         line("sensor-lag", &[0.06, 0.12, 0.2, 0.3]),
         line("reading-noise", &[0.3, 0.6, 1.5, 2.2, 3.5]),
-        line("reading-step", &[20.0, 45.0, 70.0, 95.0, 120.0, 145.0, 170.0, 200.0]),
+        line(
+            "reading-step",
+            &[20.0, 45.0, 70.0, 95.0, 120.0, 145.0, 170.0, 200.0],
+        ),
         line("reading-drift", &[-4e-4, -1.5e-4, 1.5e-4, 4e-4]),
         line("incidence-falloff", &[0.3, 0.8, 1.6, 2.6]),
         line("controller-gain", &[0.7, 0.83, 0.93, 1.07, 1.2, 1.4]),
@@ -156,7 +210,10 @@ pub(super) fn probes() -> Vec<Probe> {
         line("wheel-scale", &[0.93, 0.975, 1.025, 1.07]),
         line("axle-length", &[0.85, 0.92, 0.97, 1.03, 1.08, 1.16]),
         line("motor-lag", &[0.05, 0.1, 0.17, 0.25]),
-        probe("command-delay", &[], &delays, &[]).into_iter().map(delay).collect(),
+        probe("command-delay", &[], &delays, &[])
+            .into_iter()
+            .map(delay)
+            .collect(),
         line("dead-band", &[0.034, 0.037, 0.04, 0.043, 0.046]),
         line("speed-step", &steps),
         line("acceleration-limit", &[0.04, 0.08, 0.15, 0.3, 0.6, 1.5]),
@@ -165,8 +222,14 @@ pub(super) fn probes() -> Vec<Probe> {
         directed("floor-tilt", &[4e-4, 1.2e-3]),
         line("slip-level", &[0.2, 0.6, 1.5, 2.2, 3.5, 6.0]),
         line("slip-memory", &[0.25, 0.45, 0.65, 0.85]),
-        line("outer-wall-offset", &[-0.012, -0.005, -0.0015, 0.0015, 0.005, 0.012]),
-        line("inner-wall-offset", &[-0.012, -0.005, -0.0015, 0.0015, 0.005, 0.012]),
+        line(
+            "outer-wall-offset",
+            &[-0.012, -0.005, -0.0015, 0.0015, 0.005, 0.012],
+        ),
+        line(
+            "inner-wall-offset",
+            &[-0.012, -0.005, -0.0015, 0.0015, 0.005, 0.012],
+        ),
         places("wall-bump", 0.06, 0.008),
         line("outer-wall-reflectance", &[0.65, 0.85, 1.15, 1.45]),
         line("inner-wall-reflectance", &[0.65, 0.85, 1.15, 1.45]),
@@ -175,7 +238,11 @@ pub(super) fn probes() -> Vec<Probe> {
         vector("camera-offset", ["dx_m", "dy_m"], &[-0.003, -0.001, 0.001, 0.003]),
         line("camera-rotation", &[-0.012, -0.004, 0.004, 0.012]),
         line("camera-distortion", &[-0.015, -0.005, 0.005, 0.015]),
-        vector("marker-offset", ["forward_m", "left_m"], &[-0.004, -0.0015, 0.0015, 0.004]),
+        vector(
+            "marker-offset",
+            ["forward_m", "left_m"],
+            &[-0.004, -0.0015, 0.0015, 0.004],
+        ),
         line("camera-noise", &[0.4, 0.75, 1.4, 2.0, 3.0]),
     ]
     .concat()

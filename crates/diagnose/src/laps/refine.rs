@@ -2,12 +2,14 @@
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
+use sim::Setting;
 
-use super::atlas::{Atlas, Simulate, White, summary, white};
+use super::atlas::{Atlas, Simulate, White, observed, summary, white};
 use super::expectation::{Expectation, Scatter};
 use super::hypothesis::{Freedom, Hypothesis};
 use super::screen::price;
 use super::summary::Summary;
+use crate::Error;
 
 /// Data sets simulated at each point of a round.
 const ROUND_SETS: u64 = 10;
@@ -72,9 +74,10 @@ impl Atlas {
         for _ in 0..rounds {
             let local = self.local(simulate, &hypothesis, &freedoms)?;
             let target = white(&local.scatter, &self.laps, data, &local.center);
-            let (moves, covariance) = local.nearest(&target, &freedoms);
-            let left = local.left(&target, &moves).norm_squared() / (1.0 + local.error);
-            score = self.gain(data, left, local.scatter.log_det) - price(freedoms.len(), self.laps.iter().sum());
+            let (moves, covariance) = nearest(&local.columns, &target, &freedoms);
+            let left = left_of(&local.columns, &target, &moves).norm_squared() / (1.0 + local.error);
+            score =
+                self.gain(data, left, local.scatter.log_det) - price(freedoms.len(), self.laps.iter().sum());
             let settled = (0..moves.len()).all(|i| moves[i].abs() < 0.5 * covariance[(i, i)].sqrt());
             let by: Vec<(Freedom, f64)> = freedoms.iter().copied().zip(moves.iter().copied()).collect();
             hypothesis = hypothesis.moved(self, &by);
@@ -89,11 +92,59 @@ impl Atlas {
             }
         }
         let errors = freedoms.into_iter().zip(errors).collect();
-        Some(Descended { hypothesis: self.quantised(hypothesis), errors, score })
+        Some(Descended {
+            hypothesis: self.quantised(hypothesis),
+            errors,
+            score,
+        })
+    }
+
+    /// For each run a hypothesis with sizes fitted to the other runs alone, by the parabolas about its sizes; a size of the run
+    /// itself becomes the mean of the others'.
+    ///
+    /// # Errors
+    /// Other runs of fewer than three laps, or a robot that crashes.
+    pub(super) fn leave_out(
+        &self,
+        simulate: &Simulate<'_>,
+        runs: &[Vec<track::Lap>],
+        hypothesis: &Hypothesis,
+    ) -> Result<Vec<Vec<Setting>>, Error> {
+        let freedoms = hypothesis.freedoms(self);
+        let local = self.local(simulate, hypothesis, &freedoms).ok_or(Error::Crash)?;
+        let lap = self.null.trend.len();
+        let fit_without = |left_out: usize| {
+            let others: Vec<Vec<track::Lap>> = runs
+                .iter()
+                .enumerate()
+                .filter(|(r, _)| *r != left_out)
+                .map(|(_, laps)| laps.clone())
+                .collect();
+            let mut data = observed(&Summary::new(&others).ok_or(Error::TooFewLaps)?);
+            data.means.insert(left_out, local.center.means[left_out].clone());
+            let target = white(&local.scatter, &self.laps, &data, &local.center);
+            let mut columns = local.columns.clone();
+            for column in &mut columns {
+                column.slope.rows_mut(left_out * lap, lap).fill(0.0);
+                column.curvature.rows_mut(left_out * lap, lap).fill(0.0);
+            }
+            let (moves, _) = nearest(&columns, &target, &freedoms);
+            let moves: Vec<(Freedom, f64)> = freedoms.iter().copied().zip(moves.iter().copied()).collect();
+            let moved = self
+                .quantised(hypothesis.moved(self, &moves))
+                .with_mean_size(left_out);
+            Ok(moved.settings(self))
+        };
+        (0..runs.len()).map(fit_without).collect()
     }
 
     /// A hypothesis at its most likely sizes, simulated often enough to judge it.
-    pub(super) fn settle(&self, simulate: &Simulate<'_>, data: &Expectation, found: &Descended) -> Option<Refined> {
+    pub(super) fn settle(
+        &self,
+        simulate: &Simulate<'_>,
+        data: &Expectation,
+        found: &Descended,
+    ) -> Option<Refined> {
         let end = self.evaluate(simulate, &found.hypothesis, FINAL_SETS)?;
         self.judge(data, found.hypothesis.clone(), found.errors.clone(), &end)
     }
@@ -113,7 +164,9 @@ impl Atlas {
             let probe = &self.probes[part.probe];
             if let Some(quantum) = probe.quantum {
                 let i = probe.free[0].0;
-                part.values.iter_mut().for_each(|values| values[i] = (values[i] / quantum).round() * quantum);
+                part.values
+                    .iter_mut()
+                    .for_each(|values| values[i] = (values[i] / quantum).round() * quantum);
             }
         }
         hypothesis
@@ -131,15 +184,23 @@ impl Atlas {
         let residual = white(&scatter, &self.laps, data, &end.expectation) / (1.0 + end.error).sqrt();
         let gain = self.gain(data, residual.norm_squared(), scatter.log_det);
         let score = gain - price(errors.len(), self.laps.iter().sum());
-        Some(Refined { hypothesis, errors, residual, gain, score })
+        Some(Refined {
+            hypothesis,
+            errors,
+            residual,
+            gain,
+            score,
+        })
     }
 
     /// Simulates a hypothesis. What the draws of these data sets did to the declared model is taken off as far as it
     /// helps (a control variate).
     fn evaluate(&self, simulate: &Simulate<'_>, hypothesis: &Hypothesis, sets: u64) -> Option<Evaluated> {
         let settings = hypothesis.settings(self);
-        let summaries: Vec<Summary> =
-            (0..sets).into_par_iter().map(|set| summary(simulate, &settings, set)).collect::<Option<_>>()?;
+        let summaries: Vec<Summary> = (0..sets)
+            .into_par_iter()
+            .map(|set| summary(simulate, &settings, set))
+            .collect::<Option<_>>()?;
         let alike = hypothesis.alike();
         let mean = Expectation::of(summaries.iter(), alike);
         let declared = &self.samples[..sets as usize];
@@ -147,13 +208,19 @@ impl Atlas {
         let (mut both, mut own) = (0.0, 0.0);
         for (summary, sample) in summaries.iter().zip(declared) {
             let sample = self.white(sample, &declared_mean);
-            both += self.white(&Expectation::of(std::iter::once(summary), false), &mean).dot(&sample);
+            both += self
+                .white(&Expectation::of(std::iter::once(summary), false), &mean)
+                .dot(&sample);
             own += sample.norm_squared();
         }
         let share = (both / own).clamp(0.0, 1.0);
         let expectation = mean.moved(share, &declared_mean, &self.null);
         let error = (1.0 - share * share) / sets as f64 + share * share / self.samples.len() as f64;
-        Some(Evaluated { expectation, error, summaries })
+        Some(Evaluated {
+            expectation,
+            error,
+            summaries,
+        })
     }
 
     fn local(&self, simulate: &Simulate<'_>, hypothesis: &Hypothesis, freedoms: &[Freedom]) -> Option<Local> {
@@ -164,12 +231,15 @@ impl Atlas {
                 let moves: Vec<(Freedom, f64)> = group.iter().map(|f| (*f, sign * f.step)).collect();
                 let moved = hypothesis.moved(self, &moves);
                 let by: Vec<f64> = group.iter().map(|f| moved.get(f) - hypothesis.get(f)).collect();
-                self.evaluate(simulate, &moved, ROUND_SETS).map(|evaluated| (by, evaluated))
+                self.evaluate(simulate, &moved, ROUND_SETS)
+                    .map(|evaluated| (by, evaluated))
             };
             let (down, up) = (at(-1.0)?, at(1.0)?);
             sides.push((group, down, up));
         }
-        let all = sides.iter().flat_map(|(_, a, b)| a.1.summaries.iter().chain(&b.1.summaries));
+        let all = sides
+            .iter()
+            .flat_map(|(_, a, b)| a.1.summaries.iter().chain(&b.1.summaries));
         let scatter = Scatter::of_laps(center.summaries.iter().chain(all), &self.scatter)?;
         let action = |e: &Evaluated| white(&scatter, &self.laps, &e.expectation, &center.expectation);
         let lap = self.null.trend.len();
@@ -177,11 +247,20 @@ impl Atlas {
         for (group, (down_by, down), (up_by, up)) in &sides {
             let (down, up) = (action(down), action(up));
             for (i, freedom) in group.iter().enumerate() {
-                let mask = |w: &White| freedom.run().map_or_else(|| w.clone(), |run| of_run(w, run, lap, self.laps.len()));
+                let mask = |w: &White| {
+                    freedom
+                        .run()
+                        .map_or_else(|| w.clone(), |run| of_run(w, run, lap, self.laps.len()))
+                };
                 columns.push(Column::through((down_by[i], mask(&down)), (up_by[i], mask(&up))));
             }
         }
-        Some(Local { center: center.expectation, error: center.error, scatter, columns })
+        Some(Local {
+            center: center.expectation,
+            error: center.error,
+            scatter,
+            columns,
+        })
     }
 }
 
@@ -219,6 +298,7 @@ struct Local {
 }
 
 /// The action of one number: slope and curvature.
+#[derive(Clone)]
 struct Column {
     slope: White,
     curvature: White,
@@ -232,7 +312,10 @@ impl Column {
             // At the end of the range there is one side only.
             let (by, action) = if a == 0.0 { up } else { down };
             let slope = if by == 0.0 { action * 0.0 } else { action / by };
-            return Self { curvature: &slope * 0.0, slope };
+            return Self {
+                curvature: &slope * 0.0,
+                slope,
+            };
         }
         let curvature = (&up.1 / b - &down.1 / a) / (b - a);
         let slope = &up.1 / b - &curvature * b;
@@ -240,53 +323,61 @@ impl Column {
     }
 }
 
-impl Local {
-    /// The moves that bring the parabolas nearest to the target, and their covariance.
-    fn nearest(&self, target: &White, freedoms: &[Freedom]) -> (DVector<f64>, DMatrix<f64>) {
-        let count = self.columns.len();
-        let mut moves = DVector::<f64>::zeros(count);
-        let mut normal = DMatrix::identity(count, count);
-        for _ in 0..30 {
-            let left = self.left(target, &moves);
-            let slopes: Vec<White> =
-                self.columns.iter().zip(moves.iter()).map(|(c, m)| &c.slope + &c.curvature * (2.0 * m)).collect();
-            normal = DMatrix::from_fn(count, count, |i, j| slopes[i].dot(&slopes[j]));
-            // A number without action stays where it is.
-            for (i, freedom) in freedoms.iter().enumerate() {
-                normal[(i, i)] += 1e-6 / (freedom.step * freedom.step);
-            }
-            let gradient = DVector::from_fn(count, |i, _| slopes[i].dot(&left));
-            let Some(step) = normal.clone().cholesky().map(|f| f.solve(&gradient)) else { break };
-            let mut share = 1.0;
-            let mut next = self.bounded(&moves, &step, share, freedoms);
-            while self.left(target, &next).norm_squared() > left.norm_squared() && share > 1e-3 {
-                share *= 0.5;
-                next = self.bounded(&moves, &step, share, freedoms);
-            }
-            let change = (&next - &moves).component_div(&DVector::from_fn(count, |i, _| freedoms[i].step)).amax();
-            moves = next;
-            if change < 1e-6 {
-                break;
-            }
+/// The moves that bring the parabolas nearest to the target, and their covariance.
+fn nearest(columns: &[Column], target: &White, freedoms: &[Freedom]) -> (DVector<f64>, DMatrix<f64>) {
+    let count = columns.len();
+    let mut moves = DVector::<f64>::zeros(count);
+    let mut normal = DMatrix::identity(count, count);
+    for _ in 0..30 {
+        let left = left_of(columns, target, &moves);
+        let slopes: Vec<White> = columns
+            .iter()
+            .zip(moves.iter())
+            .map(|(c, m)| &c.slope + &c.curvature * (2.0 * m))
+            .collect();
+        normal = DMatrix::from_fn(count, count, |i, j| slopes[i].dot(&slopes[j]));
+        // A number without action stays where it is.
+        for (i, freedom) in freedoms.iter().enumerate() {
+            normal[(i, i)] += 1e-6 / (freedom.step * freedom.step);
         }
-        let covariance = normal.cholesky().map_or_else(|| DMatrix::identity(count, count), |f| f.inverse());
-        (moves, covariance)
-    }
-
-    fn left(&self, target: &White, moves: &DVector<f64>) -> White {
-        let mut left = target.clone();
-        for (column, &m) in self.columns.iter().zip(moves.iter()) {
-            left.axpy(-m, &column.slope, 1.0);
-            left.axpy(-m * m, &column.curvature, 1.0);
+        let gradient = DVector::from_fn(count, |i, _| slopes[i].dot(&left));
+        let Some(step) = normal.clone().cholesky().map(|f| f.solve(&gradient)) else {
+            break;
+        };
+        let mut share = 1.0;
+        let mut next = bounded(&moves, &step, share, freedoms);
+        while left_of(columns, target, &next).norm_squared() > left.norm_squared() && share > 1e-3 {
+            share *= 0.5;
+            next = bounded(&moves, &step, share, freedoms);
         }
-        left
+        let change = (&next - &moves)
+            .component_div(&DVector::from_fn(count, |i, _| freedoms[i].step))
+            .amax();
+        moves = next;
+        if change < 1e-6 {
+            break;
+        }
     }
+    let covariance = normal
+        .cholesky()
+        .map_or_else(|| DMatrix::identity(count, count), |f| f.inverse());
+    (moves, covariance)
+}
 
-    /// A parabola is trusted for twice the step it was made with.
-    fn bounded(&self, moves: &DVector<f64>, step: &DVector<f64>, share: f64, freedoms: &[Freedom]) -> DVector<f64> {
-        DVector::from_fn(moves.len(), |i, _| {
-            let most = 2.5 * freedoms[i].step;
-            (moves[i] + share * step[i]).clamp(-most, most)
-        })
+/// What the parabolas at some moves leave of the target.
+fn left_of(columns: &[Column], target: &White, moves: &DVector<f64>) -> White {
+    let mut left = target.clone();
+    for (column, &m) in columns.iter().zip(moves.iter()) {
+        left.axpy(-m, &column.slope, 1.0);
+        left.axpy(-m * m, &column.curvature, 1.0);
     }
+    left
+}
+
+/// A parabola is trusted for twice the step it was made with.
+fn bounded(moves: &DVector<f64>, step: &DVector<f64>, share: f64, freedoms: &[Freedom]) -> DVector<f64> {
+    DVector::from_fn(moves.len(), |i, _| {
+        let most = 2.5 * freedoms[i].step;
+        (moves[i] + share * step[i]).clamp(-most, most)
+    })
 }

@@ -24,7 +24,8 @@ impl Atlas {
         let mut all: Vec<Screened> = (0..self.probes.len())
             .flat_map(|probe| {
                 let nodes = self.nodes(probe);
-                [Shape::Constant, Shape::ByRun, Shape::ByTime].map(|shape| self.screen_one(probe, &nodes, shape, residual))
+                [Shape::Constant, Shape::ByRun, Shape::ByTime]
+                    .map(|shape| self.screen_one(probe, &nodes, shape, residual))
             })
             .flatten()
             .collect();
@@ -43,9 +44,15 @@ impl Atlas {
     /// Sizes and actions along a probe's path, the neutral size among them, in order of size.
     pub(super) fn nodes(&self, probe: usize) -> Vec<(f64, White)> {
         let p = &self.probes[probe];
-        let simulated = p.sizes.iter().zip(&self.paths[probe]).filter_map(|(&s, w)| w.as_ref().map(|w| (s, w.clone())));
+        let simulated = p
+            .sizes
+            .iter()
+            .zip(&self.paths[probe])
+            .filter_map(|(&s, w)| w.as_ref().map(|w| (s, w.clone())));
         let mut nodes: Vec<(f64, White)> = simulated.collect();
-        let Some(length) = nodes.first().map(|(_, w)| w.len()) else { return nodes };
+        let Some(length) = nodes.first().map(|(_, w)| w.len()) else {
+            return nodes;
+        };
         if p.odd {
             let mirrored: Vec<_> = nodes.iter().map(|(s, w)| (2.0 * p.neutral - s, -w)).collect();
             nodes.extend(mirrored);
@@ -55,7 +62,13 @@ impl Atlas {
         nodes
     }
 
-    fn screen_one(&self, probe: usize, nodes: &[(f64, White)], shape: Shape, residual: &White) -> Option<Screened> {
+    fn screen_one(
+        &self,
+        probe: usize,
+        nodes: &[(f64, White)],
+        shape: Shape,
+        residual: &White,
+    ) -> Option<Screened> {
         let p = &self.probes[probe];
         let size = residual.len();
         let runs = self.laps.len();
@@ -78,7 +91,9 @@ impl Atlas {
                 }
                 let middle = at(nodes, sizes.iter().sum::<f64>() / runs as f64);
                 let rest = runs * lap;
-                action.rows_mut(rest, size - rest).copy_from(&middle.rows(rest, size - rest));
+                action
+                    .rows_mut(rest, size - rest)
+                    .copy_from(&middle.rows(rest, size - rest));
                 (sizes, action, p.free.len() - 1 + runs)
             }
             Shape::ByTime => {
@@ -94,7 +109,13 @@ impl Atlas {
         let gain = residual.norm_squared() - (residual - &action).norm_squared();
         let laps = self.laps.iter().sum();
         let score = 0.5 * gain - price(fitted, laps);
-        Some(Screened { hypothesis: Hypothesis { parts: vec![Part::screened(self, probe, shape, &size_at)] }, action, score })
+        Some(Screened {
+            hypothesis: Hypothesis {
+                parts: vec![Part::screened(self, probe, shape, &size_at)],
+            },
+            action,
+            score,
+        })
     }
 }
 
@@ -105,7 +126,10 @@ fn nearest(nodes: &[(f64, White)], residual: &White, first: usize, count: usize)
     let mut best: Option<(f64, f64, White)> = None;
     for (i, pair) in nodes.windows(2).enumerate() {
         let ((s0, w0), (s1, w1)) = (&pair[0], &pair[1]);
-        let (from, along) = (w0.rows(first, count), w1.rows(first, count) - w0.rows(first, count));
+        let (from, along) = (
+            w0.rows(first, count),
+            w1.rows(first, count) - w0.rows(first, count),
+        );
         let square = along.norm_squared();
         if square == 0.0 {
             continue;
@@ -134,7 +158,10 @@ fn tangent(nodes: &[(f64, White)], size: f64) -> White {
 
 /// The piece of a path that holds a size: its first node and its slope.
 fn piece(nodes: &[(f64, White)], size: f64) -> (&(f64, White), White) {
-    let i = nodes.windows(2).position(|pair| size < pair[1].0).unwrap_or(nodes.len() - 2);
+    let i = nodes
+        .windows(2)
+        .position(|pair| size < pair[1].0)
+        .unwrap_or(nodes.len() - 2);
     let slope = (&nodes[i + 1].1 - &nodes[i].1) / (nodes[i + 1].0 - nodes[i].0);
     (&nodes[i], slope)
 }

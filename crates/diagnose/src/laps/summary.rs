@@ -25,7 +25,10 @@ pub(super) fn lap_vector(lap: &Lap) -> DVector<f64> {
     };
     let border = |block: usize| block * gates / BLOCKS;
     let durations = (0..BLOCKS).map(|b| 100.0 * (time(border(b + 1)) - time(border(b))).abs());
-    DVector::from_iterator(gates + BLOCKS, lap.offsets_m.iter().map(|m| 1000.0 * m).chain(durations))
+    DVector::from_iterator(
+        gates + BLOCKS,
+        lap.offsets_m.iter().map(|m| 1000.0 * m).chain(durations),
+    )
 }
 
 /// What one run tells of its laps' mean and its change.
@@ -53,9 +56,14 @@ pub(crate) struct Summary {
 impl Summary {
     /// The summary of runs of closed laps; `None` if a run has fewer than three, or they have too few gates.
     pub(crate) fn new(runs: &[Vec<Lap>]) -> Option<Self> {
-        let vectors: Vec<Vec<DVector<f64>>> =
-            runs.iter().map(|laps| laps.iter().map(lap_vector).collect()).collect();
-        let finite = vectors.iter().flatten().all(|lap| lap.iter().all(|x| x.is_finite()));
+        let vectors: Vec<Vec<DVector<f64>>> = runs
+            .iter()
+            .map(|laps| laps.iter().map(lap_vector).collect())
+            .collect();
+        let finite = vectors
+            .iter()
+            .flatten()
+            .all(|lap| lap.iter().all(|x| x.is_finite()));
         if !finite || vectors.is_empty() || vectors.iter().any(|laps| laps.len() < 3) {
             return None;
         }
@@ -74,7 +82,12 @@ impl Summary {
             summaries.push(summary);
         }
         let second = second_order(&vectors);
-        Some(Self { runs: summaries, second, scatter, freedom })
+        Some(Self {
+            runs: summaries,
+            second,
+            scatter,
+            freedom,
+        })
     }
 
     /// Laps in all.
@@ -97,7 +110,11 @@ fn summarise(laps: &[DVector<f64>]) -> RunSummary {
         mean.axpy(1.0 / laps.len() as f64, lap, 1.0);
         trend.axpy(position, lap, 1.0);
     }
-    RunSummary { laps: laps.len(), mean, trend }
+    RunSummary {
+        laps: laps.len(),
+        mean,
+        trend,
+    }
 }
 
 /// How the laps scatter, as [`SECOND`] numbers: log variance about the means of a run's quarters in 10 blocks of gates and
@@ -121,10 +138,14 @@ fn second_order(runs: &[Vec<DVector<f64>>]) -> DVector<f64> {
             for g in 5..gates.saturating_sub(5) {
                 rough5.add(deviation[g - 5] - 2.0 * deviation[g] + deviation[g + 5]);
             }
-            deviation.rows(gates, BLOCKS).iter().for_each(|&d| durations.add(d));
+            deviation
+                .rows(gates, BLOCKS)
+                .iter()
+                .for_each(|&d| durations.add(d));
         }
     }
-    let log_variance = |from: usize, to: usize| (squares.rows(from, to - from).sum() / freedom / (to - from) as f64).ln();
+    let log_variance =
+        |from: usize, to: usize| (squares.rows(from, to - from).sum() / freedom / (to - from) as f64).ln();
     let gate_blocks = (0..10).map(|b| log_variance(b * gates / 10, (b + 1) * gates / 10));
     let time_blocks = (0..5).map(|b| log_variance(gates + 4 * b, gates + 4 * (b + 1)));
     let others = [

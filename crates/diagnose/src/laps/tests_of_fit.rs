@@ -53,7 +53,11 @@ impl FourNumbers {
         let total: usize = laps.iter().sum();
         let mut mean = White::zeros(lap);
         for (r, &n) in laps.iter().enumerate() {
-            mean.axpy((n as f64 / total as f64).sqrt(), &residual.rows(r * lap, lap).into_owned(), 1.0);
+            mean.axpy(
+                (n as f64 / total as f64).sqrt(),
+                &residual.rows(r * lap, lap).into_owned(),
+                1.0,
+            );
         }
         let all = residual.rows(0, runs * lap).norm_squared();
         Self {
@@ -66,7 +70,10 @@ impl FourNumbers {
 
     /// Probability that the smallest of the four is as small as it is: four times that (Bonferroni).
     pub fn omnibus_p(&self) -> f64 {
-        let least = [self.mean, self.runs, self.trend, self.noise].map(|q| q.p).into_iter().fold(1.0, f64::min);
+        let least = [self.mean, self.runs, self.trend, self.noise]
+            .map(|q| q.p)
+            .into_iter()
+            .fold(1.0, f64::min);
         (4.0 * least).min(1.0)
     }
 }

@@ -91,6 +91,13 @@ impl<'a> Evidence<'a> {
         Ok(Self { scene, model, stretches: stretches.into_iter().flatten().collect() })
     }
 
+    /// The runs that gave evidence, in rising order.
+    pub(crate) fn runs(&self) -> Vec<usize> {
+        let mut runs: Vec<usize> = self.stretches.iter().map(|stretch| stretch.run).collect();
+        runs.dedup();
+        runs
+    }
+
     /// The part of the evidence that one run gives.
     pub(crate) fn of_run(&self, run: usize) -> Self {
         let stretches = (self.stretches.iter().filter(|stretch| stretch.run == run))

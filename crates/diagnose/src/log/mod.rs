@@ -5,9 +5,11 @@ mod columns;
 mod evidence;
 mod filter;
 mod moments;
+mod noise;
 mod refine;
 mod rows;
 mod screen;
+mod search;
 
 use std::sync::Arc;
 
@@ -16,6 +18,36 @@ use sim::{Model, Scene};
 use track::Side;
 
 pub use rows::LogRow;
+
+/// debug
+pub fn debug_search(model: &Model, scene: &Scene, runs: &[Vec<LogRow>]) -> Vec<(String, f64)> {
+    let t = std::time::Instant::now();
+    let wide = {
+        let mut m = model.clone();
+        m.machine.range_m *= 1.2;
+        Scene::new(Arc::new(scene.circuit().clone()), &m, None).unwrap()
+    };
+    let refs: Vec<&[LogRow]> = runs.iter().map(|r| r.as_slice()).collect();
+    let ev = evidence::Evidence::new(&wide, model, &refs).unwrap();
+    let traces = ev.traces(&[]).unwrap();
+    eprintln!("base {:?}", t.elapsed());
+    let base: Vec<f64> = traces.iter().map(|t| t.1.log_likelihood).collect();
+    let lengths = [Side::Outer, Side::Inner].map(|s| scene.circuit().course.wall(s).length_m());
+    let variants = catalogue::variants(lengths);
+    let normals = screen::normals(&traces, &variants).unwrap();
+    eprintln!("columns {} {:?}", variants.len(), t.elapsed());
+    let leads = search::leads(&ev, &variants, &normals);
+    let list = search::shortlist(&leads, &variants, 8);
+    for l in &list {
+        eprintln!("lead {:9.1} {:?} {} {:?}", l.score(), l.by, variants[l.variant].spec.name, variants[l.variant].values);
+    }
+    let mut out: Vec<_> = list.iter().filter_map(|l| search::pursue(&ev, &variants[l.variant], l, &base)).collect();
+    eprintln!("refined {:?}", t.elapsed());
+    out.extend(noise::noises(&ev, &[], base.iter().sum()));
+    eprintln!("noise {:?}", t.elapsed());
+    out.sort_by(|a, b| b.score().total_cmp(&a.score()));
+    out.iter().map(|r| (format!("{} {:?} {:?}", r.settings[0].spec.name, r.settings[0].pattern, r.standard_errors), r.score())).collect()
+}
 
 /// debug
 pub fn debug_screen(model: &Model, scene: &Scene, runs: &[Vec<LogRow>]) -> Vec<(String, f64, Vec<f64>)> {
@@ -38,6 +70,17 @@ pub fn debug_screen(model: &Model, scene: &Scene, runs: &[Vec<LogRow>]) -> Vec<(
             (world, trace)
         })
         .collect();
+    if std::env::var("DUMP").is_ok() {
+        for (_, t) in &traces {
+            for i in &t.instants {
+                for m in 2..10 {
+                    if i.used >> m & 1 == 1 && i.innovation[m].abs() > 4.5 {
+                        println!("D {} {} {:.4} {:.4} {:.3} d {:.4} sd {:.5} exp {:.1} e {:.1}", m - 2, i.time_s, i.sensed_from.position.x, i.sensed_from.position.y, i.sensed_from.heading_rad(), i.look.distance_m[m-2], i.look.deviation_m[m-2], i.uncut[m-2], i.innovation[m]);
+                    }
+                }
+            }
+        }
+    }
     eprintln!("base {:?}", t.elapsed());
     for m in 0..10 {
         let e: Vec<f64> =

@@ -7,7 +7,6 @@ mod bvh;
 mod cases;
 mod cells;
 mod grid;
-mod march;
 #[cfg(test)]
 mod tests;
 mod tree;
@@ -131,18 +130,15 @@ pub enum CasterKind {
     Cells,
     /// For each cell of a coarse grid the stretches of wall in the robot's reach, and below each a tree of eights.
     Tree,
-    /// Each ray marches through a fine grid that knows how far the nearest wall is.
-    March,
 }
 
 impl CasterKind {
     /// All kinds with the names a user gives them.
-    pub const NAMED: [(&'static str, Self); 5] = [
+    pub const NAMED: [(&'static str, Self); 4] = [
         ("brute", Self::Brute),
         ("bvh", Self::Bvh),
         ("cells", Self::Cells),
         ("tree", Self::Tree),
-        ("march", Self::March),
     ];
 
     /// The quicker of our casters for these walls: by benches/ray_cast.rs the tree wins as soon as segments are on
@@ -151,6 +147,11 @@ impl CasterKind {
         const LONG_SEGMENT: f64 = 0.16;
         let length_m: f64 = walls.segments().map(|(_, a, b)| a.distance(b)).sum();
         if length_m < LONG_SEGMENT * range_m * walls.len() as f64 { Self::Tree } else { Self::Cells }
+    }
+
+    /// The kind of that name.
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::NAMED.iter().find(|(known, _)| *known == name).map(|(_, kind)| *kind)
     }
 
     /// The name a user gives this kind.
@@ -172,7 +173,6 @@ enum Method {
     Bvh(Box<bvh::Bvh>),
     Cells(Cells),
     Tree(tree::Tree),
-    March(march::March),
 }
 
 impl Caster {
@@ -185,7 +185,6 @@ impl Caster {
             CasterKind::Bvh => Method::Bvh(Box::new(bvh::Bvh::new(walls))),
             CasterKind::Cells => Method::Cells(Cells::new(walls, range_m + spread_m)),
             CasterKind::Tree => Method::Tree(tree::Tree::new(walls, range_m + spread_m)),
-            CasterKind::March => Method::March(march::March::new(walls, range_m)),
         };
         Self { method, range_m }
     }
@@ -197,7 +196,6 @@ impl Caster {
             Method::Bvh(_) => CasterKind::Bvh,
             Method::Cells(_) => CasterKind::Cells,
             Method::Tree(_) => CasterKind::Tree,
-            Method::March(_) => CasterKind::March,
         }
     }
 
@@ -209,7 +207,6 @@ impl Caster {
             Method::Bvh(bvh) => bvh.cast(rays, self.range_m),
             Method::Cells(cells) => cells.cast(walls, center, rays),
             Method::Tree(tree) => tree.cast(center, rays, self.range_m),
-            Method::March(march) => march.cast(walls, rays, self.range_m),
         };
         for distance in &mut hits.distance_m {
             *distance = if *distance <= self.range_m { *distance } else { f64::INFINITY };

@@ -3,9 +3,10 @@ use track::{Course, Vec2};
 
 use super::cases::{RANGE_M, SPREAD_M, Uniform};
 use super::{Caster, CasterKind, LANES, Rays, segment_distance_m};
-use crate::{Hits, Streams, Walls};
+use crate::effects::testing::{declared, scene};
+use crate::{Hits, Run, Scene, Step, Streams, Walls};
 
-const OURS: [CasterKind; 4] = [CasterKind::Brute, CasterKind::Cells, CasterKind::Tree, CasterKind::March];
+const OURS: [CasterKind; 3] = [CasterKind::Brute, CasterKind::Cells, CasterKind::Tree];
 
 fn caster(kind: CasterKind, walls: &Walls) -> Caster {
     Caster::new(Some(kind), walls, RANGE_M, SPREAD_M)
@@ -112,5 +113,24 @@ fn the_caster_is_chosen_by_the_walls() {
         let chains = (course.outer.flatten(max_error_m).unwrap(), course.inner.flatten(max_error_m).unwrap());
         let walls = Walls::new(&chains.0, &chains.1, 0.0);
         assert_eq!(Caster::new(None, &walls, 0.1, 0.035).kind(), expected, "{} segments", walls.len());
+    }
+}
+
+#[test]
+fn a_drive_does_not_depend_on_the_caster() {
+    let circuit = std::sync::Arc::new(scene().circuit().clone());
+    for (max_error_m, thickness_m) in [(0.05, 0.0), (0.005, 0.0), (0.005, 0.01), (2e-5, 0.0)] {
+        let mut model = declared();
+        (model.wall.max_error_m, model.wall.thickness_m) = (max_error_m, thickness_m);
+        let drive = |kind| -> Vec<Step> {
+            let scene = Scene::new(circuit.clone(), &model, kind).unwrap();
+            let world = scene.world(&model, 0).unwrap();
+            let mut run = Run::new(&world, Streams { seed: 5, run: 0 }).unwrap();
+            (0..600).map(|_| run.step()).collect()
+        };
+        let chosen = drive(None);
+        for kind in OURS {
+            assert_eq!(drive(Some(kind)), chosen, "{kind:?}, {max_error_m} m");
+        }
     }
 }

@@ -12,7 +12,7 @@ mod rays;
 mod sense;
 mod setting;
 #[cfg(test)]
-mod testing;
+pub(crate) mod testing;
 #[cfg(test)]
 mod tests;
 mod unlisted;

@@ -1,0 +1,48 @@
+//! `lapwing trace`: what the model lacks.
+
+use anyhow::{Result, bail};
+use serde_json::json;
+
+use crate::args;
+use crate::dataset::DataSet;
+use crate::experiments::Section;
+use crate::output::{OutDir, Work};
+use crate::report::Report;
+use crate::session::Session;
+use crate::setup;
+use crate::trace::{Cache, Trace, document, sections, summary};
+
+pub(crate) fn run(session: &Session, args: &args::Trace) -> Result<()> {
+    let file = setup::model_file(&args.model)?;
+    let [measured] = args.measured.as_slice() else {
+        bail!("one --measured data set at a time can be traced; {} given", args.measured.len());
+    };
+    let set = DataSet::load(measured)?;
+    let held_out = args.held_out.as_deref().map(DataSet::load).transpose()?;
+    let mut inputs = vec![file.input.clone()];
+    inputs.extend(set.inputs.clone());
+    inputs.extend(held_out.iter().flat_map(|set| set.inputs.clone()));
+    let configuration = json!({
+        "model": file.config, "seed": session.seed(), "measured": args.measured, "held_out": args.held_out, "inputs": inputs,
+    });
+    let folder = OutDir::create(&args.out, &Work::new("trace", &configuration), false)?;
+    let cache = Cache::new(args.cache.as_deref(), !args.no_cache);
+    let world = args.model.settings.world.as_deref();
+    let trace = Trace::new(session, &file, world, set, held_out, &cache)?;
+    let document = document(&trace);
+    let sections = sections(&trace)?;
+    folder.write("trace.json", format!("{document:#}\n"))?;
+    folder.write("model.after.toml", trace.after_config().to_toml())?;
+    for picture in sections.iter().flat_map(Section::pictures) {
+        folder.write(&format!("figures/{}.svg", picture.file), picture.figure.to_svg()?)?;
+    }
+    let text = summary(&trace);
+    let title = format!("What the model lacks: {}", trace.measured.set.name);
+    let tables: String = sections.iter().flat_map(Section::tables).map(|table| table.to_text() + "\n").collect();
+    folder.write("report.html", Report { title, lead: Vec::new(), sections }.to_html()?)?;
+    folder.finish(&session.manifest(configuration, inputs))?;
+    if args.json {
+        return session.print_json(&document);
+    }
+    session.print(&format!("{text}\n\n{tables}report: {}\n", args.out.join("report.html").display()))
+}

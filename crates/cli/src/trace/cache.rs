@@ -1,0 +1,55 @@
+//! Signatures of a model, kept between calls.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use diagnose::Atlas;
+
+use crate::output::sha256;
+
+/// A folder of atlases, each named after what decides its contents. A file that does not hold what it says is made anew.
+#[derive(Debug)]
+pub(crate) struct Cache(Option<PathBuf>);
+
+impl Cache {
+    /// The cache in a folder; the platform's own if none is given; none at all if it is not wanted.
+    pub(crate) fn new(folder: Option<&Path>, wanted: bool) -> Self {
+        let place = || folder.map(Path::to_owned).or_else(|| directories().map(|dir| dir.join("lapwing")));
+        Self(wanted.then(place).flatten())
+    }
+
+    fn file(&self, key: &str) -> Option<PathBuf> {
+        let name = format!("atlas-{}-{}", env!("CARGO_PKG_VERSION"), &sha256(key.as_bytes())[..32]);
+        self.0.as_ref().map(|folder| folder.join(name))
+    }
+
+    /// The atlas of a key, if it is there and whole.
+    pub(crate) fn get(&self, key: &str) -> Option<Atlas> {
+        let bytes = fs::read(self.file(key)?).ok()?;
+        let (hash, atlas) = bytes.split_at_checked(64)?;
+        (sha256(atlas).as_bytes() == hash).then(|| Atlas::from_bytes(atlas)).flatten()
+    }
+
+    /// Keeps an atlas; a cache that cannot be written is no error, the next call only takes longer.
+    pub(crate) fn put(&self, key: &str, atlas: &Atlas) -> Option<()> {
+        let file = self.file(key)?;
+        fs::create_dir_all(file.parent()?).ok()?;
+        let bytes = atlas.to_bytes();
+        let whole = [sha256(&bytes).as_bytes(), &bytes].concat();
+        let partial = file.with_extension(format!("partial{}", std::process::id()));
+        fs::write(&partial, whole).ok()?;
+        fs::rename(&partial, &file).ok()
+    }
+}
+
+/// The platform's folder for caches, by its own rules.
+fn directories() -> Option<PathBuf> {
+    let variable = |name: &str| std::env::var_os(name).filter(|value| !value.is_empty()).map(PathBuf::from);
+    if cfg!(windows) {
+        return variable("LOCALAPPDATA");
+    }
+    if cfg!(target_os = "macos") {
+        return variable("HOME").map(|home| home.join("Library/Caches"));
+    }
+    variable("XDG_CACHE_HOME").or_else(|| variable("HOME").map(|home| home.join(".cache")))
+}

@@ -1,0 +1,230 @@
+//! Which variants, in which pattern over runs and time, are worth a refinement, and which of those wins.
+
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+use sim::{Pattern, Setting};
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+
+use super::catalogue::{Shape, Variant};
+use super::evidence::Evidence;
+use super::refine::{Fitted, hunt, jumps, knobs, refine};
+use super::screen::{Normal, solve};
+
+/// How an effect's values go over the runs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum By {
+    Constant,
+    Time,
+    Run,
+}
+
+/// A variant in a pattern with what linear algebra says that it gains.
+#[derive(Debug, Clone)]
+pub(crate) struct Lead {
+    pub(crate) variant: usize,
+    pub(crate) by: By,
+    pub(crate) gain: f64,
+    pub(crate) fitted: usize,
+    /// Multiples of the columns: one list, or one for each run.
+    multiples: Vec<DVector<f64>>,
+}
+
+impl Lead {
+    /// Gain less what chance and choice give to as many values (the Bayesian price of a value told to 1 in 80).
+    pub(crate) fn score(&self) -> f64 {
+        self.gain - price(self.fitted, self.by)
+    }
+
+    /// Probability of as large a gain by chance.
+    pub(crate) fn p(&self) -> f64 {
+        tail(2.0 * self.gain, self.fitted)
+    }
+}
+
+/// Log-likelihood that a candidate must pay for its values and its pattern.
+pub(crate) fn price(fitted: usize, by: By) -> f64 {
+    2.2 * fitted as f64 + if by == By::Constant { 0.0 } else { 4.0 }
+}
+
+/// Probability that a chi-squared variable exceeds a value.
+pub(crate) fn tail(value: f64, freedom: usize) -> f64 {
+    ChiSquared::new(freedom.max(1) as f64).map_or(1.0, |chi| chi.sf(value.max(0.0)))
+}
+
+/// Every variant in every pattern.
+pub(crate) fn leads(evidence: &Evidence<'_>, variants: &[Variant], normals: &[Vec<Normal>]) -> Vec<Lead> {
+    let runs = evidence.runs();
+    (variants.iter().zip(normals).enumerate())
+        .flat_map(|(i, (variant, normals))| {
+            let mut leads = vec![constant(i, normals)];
+            if !(variant.shape == Shape::Scan && variant.spec.name != "cone-of-view") {
+                leads.push(by_time(i, normals));
+                if runs.len() > 1 {
+                    leads.push(by_run(evidence, i, normals, &runs));
+                }
+            }
+            leads
+        })
+        .collect()
+}
+
+fn sums(normals: impl Iterator<Item = Normal>) -> Option<Normal> {
+    normals.reduce(|a, b| Normal {
+        right: a.right + b.right,
+        left: a.left + b.left,
+        right_time: a.right_time + b.right_time,
+        cross_time: a.cross_time + b.cross_time,
+        left_time: a.left_time + b.left_time,
+    })
+}
+
+fn constant(variant: usize, normals: &[Normal]) -> Lead {
+    let solution = sums(normals.iter().cloned()).map(|sum| solve(&sum.left, &sum.right));
+    let (multiples, gain) = solution.map_or((DVector::zeros(0), 0.0), |s| (s.multiples, s.gain));
+    Lead { variant, by: By::Constant, gain, fitted: multiples.len(), multiples: vec![multiples] }
+}
+
+fn by_time(variant: usize, normals: &[Normal]) -> Lead {
+    let Some(sum) = sums(normals.iter().cloned()) else { return constant(variant, normals) };
+    let k = sum.right.len();
+    let mut left = DMatrix::zeros(2 * k, 2 * k);
+    left.view_mut((0, 0), (k, k)).copy_from(&sum.left);
+    left.view_mut((0, k), (k, k)).copy_from(&sum.cross_time);
+    left.view_mut((k, 0), (k, k)).copy_from(&sum.cross_time);
+    left.view_mut((k, k), (k, k)).copy_from(&sum.left_time);
+    let right = DVector::from_iterator(2 * k, sum.right.iter().chain(sum.right_time.iter()).copied());
+    let solution = solve(&left, &right);
+    Lead { variant, by: By::Time, gain: solution.gain, fitted: 2 * k, multiples: vec![solution.multiples] }
+}
+
+fn by_run(evidence: &Evidence<'_>, variant: usize, normals: &[Normal], runs: &[usize]) -> Lead {
+    let of = |run: usize| {
+        let mine = evidence.stretches.iter().zip(normals).filter(move |(s, _)| s.run == run);
+        sums(mine.map(|(_, n)| n.clone())).map(|sum| solve(&sum.left, &sum.right))
+    };
+    let solutions: Vec<_> = runs.iter().filter_map(|&run| of(run)).collect();
+    Lead {
+        variant,
+        by: By::Run,
+        gain: solutions.iter().map(|s| s.gain).sum(),
+        fitted: solutions.iter().map(|s| s.multiples.len()).sum(),
+        multiples: solutions.into_iter().map(|s| s.multiples).collect(),
+    }
+}
+
+/// The leads worth a refinement: the best of each effect, at most two of one, the best first.
+pub(crate) fn shortlist(leads: &[Lead], variants: &[Variant], most: usize) -> Vec<Lead> {
+    let mut sorted: Vec<&Lead> = leads.iter().collect();
+    sorted.sort_by(|a, b| b.score().total_cmp(&a.score()));
+    let mut list: Vec<Lead> = Vec::new();
+    let name = |lead: &Lead| variants[lead.variant].spec.name;
+    for lead in sorted {
+        let same = list.iter().filter(|other| name(other) == name(lead)).count();
+        let again = list.iter().any(|other| other.variant == lead.variant && other.by <= lead.by);
+        if same < 2 && !again && list.len() < most {
+            list.push(lead.clone());
+        }
+    }
+    list
+}
+
+/// A candidate with its best values and their pattern.
+#[derive(Debug, Clone)]
+pub(crate) struct Refined {
+    pub(crate) settings: Vec<Setting>,
+    /// Standard errors, setting by setting in the order of the pattern's values.
+    pub(crate) standard_errors: Vec<Vec<f64>>,
+    pub(crate) gain: f64,
+    pub(crate) fitted: usize,
+    pub(crate) by: By,
+}
+
+impl Refined {
+    pub(crate) fn score(&self) -> f64 {
+        self.gain - price(self.fitted, self.by)
+    }
+}
+
+/// Refines a lead. `base` is the log-likelihood of the declared model by stretch.
+pub(crate) fn pursue(evidence: &Evidence<'_>, variant: &Variant, lead: &Lead, base: &[f64]) -> Option<Refined> {
+    const STEPS: usize = 8;
+    match lead.by {
+        By::Constant => {
+            let setting = Setting::constant(variant.spec, variant.values_at(lead.multiples[0].as_slice()));
+            let fitted = follow(evidence, variant, setting, STEPS)?;
+            Some(refined(fitted, base.iter().sum(), By::Constant))
+        }
+        By::Time => {
+            let k = variant.sizes.len();
+            let start = variant.values_at(&lead.multiples[0].as_slice()[..k]);
+            let per_s = vec![0.0; start.len()];
+            let setting = Setting { spec: variant.spec, pattern: Pattern::ByTime { start, per_s } };
+            let knobs = knobs(variant, 0, &setting.pattern);
+            Some(refined(refine(evidence, vec![setting], knobs, STEPS)?, base.iter().sum(), By::Time))
+        }
+        By::Run => {
+            let runs = evidence.runs();
+            let parts = (runs.par_iter().zip(&lead.multiples))
+                .map(|(&run, multiples)| {
+                    let setting = Setting::constant(variant.spec, variant.values_at(multiples.as_slice()));
+                    follow(&evidence.of_run(run), variant, setting, STEPS)
+                })
+                .collect::<Option<Vec<_>>>()?;
+            Some(by_runs(evidence, variant, &runs, &parts, base))
+        }
+    }
+}
+
+fn follow(evidence: &Evidence<'_>, variant: &Variant, setting: Setting, steps: usize) -> Option<Fitted> {
+    if jumps(&setting) {
+        let spread = match setting.spec.name {
+            "command-delay" => 0.032,
+            "speed-step" => 5e-4,
+            _ => 0.003,
+        };
+        return hunt(evidence, &setting, spread);
+    }
+    let knobs = knobs(variant, 0, &setting.pattern);
+    refine(evidence, vec![setting], knobs, steps)
+}
+
+fn refined(fitted: Fitted, base: f64, by: By) -> Refined {
+    let standard_errors = (fitted.settings.iter().enumerate()).map(|(i, setting)| spread_errors(setting, i, &fitted)).collect();
+    Refined {
+        gain: fitted.log_likelihood - base,
+        fitted: fitted.knobs.len(),
+        settings: fitted.settings,
+        standard_errors,
+        by,
+    }
+}
+
+/// Standard errors in the order of the pattern's values, 0 where a value was not fitted.
+fn spread_errors(setting: &Setting, number: usize, fitted: &Fitted) -> Vec<f64> {
+    let count = setting.spec.params.len();
+    let slots = if matches!(setting.pattern, Pattern::ByTime { .. }) { 2 * count } else { count };
+    let mut errors = vec![0.0; slots];
+    for (knob, error) in fitted.knobs.iter().zip(&fitted.standard_errors).filter(|(knob, _)| knob.setting == number) {
+        errors[knob.value + if knob.slope { count } else { 0 }] = *error;
+    }
+    errors
+}
+
+fn by_runs(evidence: &Evidence<'_>, variant: &Variant, runs: &[usize], parts: &[Fitted], base: &[f64]) -> Refined {
+    let mut values = vec![variant.values.clone(); runs.last().map_or(0, |last| last + 1)];
+    let mut errors = Vec::new();
+    for (&run, part) in runs.iter().zip(parts) {
+        if let Pattern::Constant(found) = &part.settings[0].pattern {
+            values[run].clone_from(found);
+        }
+        errors.extend(spread_errors(&part.settings[0], 0, part));
+    }
+    let base: f64 = (evidence.stretches.iter().zip(base)).map(|(_, base)| base).sum();
+    Refined {
+        settings: vec![Setting { spec: variant.spec, pattern: Pattern::ByRun(values) }],
+        standard_errors: vec![errors],
+        gain: parts.iter().map(|part| part.log_likelihood).sum::<f64>() - base,
+        fitted: parts.iter().map(|part| part.knobs.len()).sum(),
+        by: By::Run,
+    }
+}
