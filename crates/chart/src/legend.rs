@@ -131,9 +131,7 @@ fn sample(svg: &mut Svg, mark: &Mark, [x, y]: Px) {
     let (style, middle, right) = (&mark.style, x + SAMPLE_PX / 2.0, x + SAMPLE_PX);
     let mut data = String::new();
     match &mark.shape {
-        Shape::Line(_) | Shape::Segments(_) | Shape::ColoredLine { .. } => {
-            horizontal(svg, [x, y], style)
-        }
+        Shape::Line(_) | Shape::Segments(_) | Shape::ColoredLine { .. } => horizontal(svg, [x, y], style),
         Shape::Rules {
             direction: Direction::Horizontal,
             ..
@@ -146,10 +144,7 @@ fn sample(svg: &mut Svg, mark: &Mark, [x, y]: Px) {
         Shape::Arrows(_) => {
             let mut head = String::new();
             line_data(
-                &[
-                    [x, y],
-                    arrow_head([x, y], [right, y], style.width_px, &mut head),
-                ],
+                &[[x, y], arrow_head([x, y], [right, y], style.width_px, &mut head)],
                 &mut data,
             );
             svg.path(&data, &stroke(style));
@@ -161,8 +156,7 @@ fn sample(svg: &mut Svg, mark: &Mark, [x, y]: Px) {
                 Direction::Horizontal => [[middle - 9.0, y], [middle + 9.0, y]],
             };
             line_data(&ends, &mut data);
-            ends.into_iter()
-                .for_each(|end| cap(end, *direction, &mut data));
+            ends.into_iter().for_each(|end| cap(end, *direction, &mut data));
             svg.path(&data, &stroke(style));
         }
         Shape::Band(_) | Shape::Stripes { .. } => {
@@ -190,11 +184,7 @@ fn horizontal(svg: &mut Svg, [x, y]: Px, style: &Style) {
 
 fn swatch(svg: &mut Svg, [x, y]: Px, attributes: &str) {
     let mut data = String::new();
-    box_data(
-        [x + 2.0, y - 5.5],
-        [x + SAMPLE_PX - 2.0, y + 5.5],
-        &mut data,
-    );
+    box_data([x + 2.0, y - 5.5], [x + SAMPLE_PX - 2.0, y + 5.5], &mut data);
     svg.path(&data, attributes);
 }
 

@@ -18,7 +18,7 @@ use crate::output::Input;
 pub(crate) use csv_file::CsvFile;
 pub(crate) use description::Kind;
 use source::{Shipped, Source};
-pub(crate) use write::{DataSetToWrite, dataset_toml, run_csv, run_name, write_dataset};
+pub(crate) use write::{DataSetToWrite, run_name, write_dataset};
 
 /// What describes a data set.
 pub(crate) const DESCRIPTION: &str = "dataset.toml";

@@ -4,10 +4,7 @@
 //! the reference: ours must give its bits, parry2d's bounding volume hierarchy its distance to 1e-9 m where a ray meets a wall at more
 //! than a degree, away from the segment's ends and from the range.
 
-#![allow(
-    clippy::print_stdout,
-    reason = "an example talks to the terminal"
-)]
+#![allow(clippy::print_stdout, reason = "an example talks to the terminal")]
 
 use std::process::ExitCode;
 
@@ -42,11 +39,24 @@ fn main() -> ExitCode {
     for _ in 0..(poses as usize).div_ceil(POSES_A_SCENE) {
         scene(&mut uniform, &mut counts);
     }
-    let Counts { rays, hits, shared_ends, wrong, compared, farthest_m } = counts;
+    let Counts {
+        rays,
+        hits,
+        shared_ends,
+        wrong,
+        compared,
+        farthest_m,
+    } = counts;
     println!("{rays} rays from {} poses, {hits} hits", rays / LANES);
-    println!("cells, tree: {wrong:?} rays differ in a bit; {shared_ends} hit another segment at a shared point");
+    println!(
+        "cells, tree: {wrong:?} rays differ in a bit; {shared_ends} hit another segment at a shared point"
+    );
     println!("parry2d: {compared} plain rays compared, farthest apart {farthest_m:.1e} m");
-    if wrong == [0; 2] && farthest_m <= 1e-9 { ExitCode::SUCCESS } else { ExitCode::from(1) }
+    if wrong == [0; 2] && farthest_m <= 1e-9 {
+        ExitCode::SUCCESS
+    } else {
+        ExitCode::from(1)
+    }
 }
 
 fn scene(uniform: &mut Uniform<impl FnMut() -> f64>, counts: &mut Counts) {
@@ -67,7 +77,8 @@ fn scene(uniform: &mut Uniform<impl FnMut() -> f64>, counts: &mut Counts) {
             counts.hits += usize::from(reference.distance_m[i].is_finite());
             for (k, hits) in found.iter().enumerate() {
                 let same = hits.distance_m[i].to_bits() == reference.distance_m[i].to_bits();
-                let other = same && reference.distance_m[i].is_finite() && hits.segment[i] != reference.segment[i];
+                let other =
+                    same && reference.distance_m[i].is_finite() && hits.segment[i] != reference.segment[i];
                 let shared = !other || distance_m(&walls, &rays, hits, i) == reference.distance_m[i];
                 counts.shared_ends += usize::from(other);
                 counts.wrong[k] += usize::from(!same || !shared);
@@ -84,7 +95,12 @@ fn scene(uniform: &mut Uniform<impl FnMut() -> f64>, counts: &mut Counts) {
 /// Distance of the segment that was hit.
 fn distance_m(walls: &Walls, rays: &Rays, hits: &Hits, i: usize) -> f64 {
     let segment = hits.segment[i] as usize;
-    segment_distance_m(rays.origin(i), rays.direction(i), walls.vertex(segment), walls.vertex(segment + 1))
+    segment_distance_m(
+        rays.origin(i),
+        rays.direction(i),
+        walls.vertex(segment),
+        walls.vertex(segment + 1),
+    )
 }
 
 /// Whether a ray meets nothing, or a segment at more than a degree, off its ends and off the range.
@@ -94,7 +110,9 @@ fn is_plain(walls: &Walls, rays: &Rays, hits: &Hits, i: usize) -> bool {
     }
     let segment = hits.segment[i] as usize;
     let point = rays.origin(i) + rays.direction(i) * hits.distance_m[i];
-    let to_end_m = point.distance(walls.vertex(segment)).min(point.distance(walls.vertex(segment + 1)));
+    let to_end_m = point
+        .distance(walls.vertex(segment))
+        .min(point.distance(walls.vertex(segment + 1)));
     let steep = walls.normal(segment).dot(rays.direction(i)).abs() > 0.0175;
     steep && to_end_m > 1e-9 && (RANGE_M - hits.distance_m[i]).abs() > 1e-9 && hits.distance_m[i] > 1e-9
 }

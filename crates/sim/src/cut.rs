@@ -18,11 +18,23 @@ use crate::Error;
 /// A number that no maximal error down to 1e-9 m reaches.
 pub fn max_error_for(course: &Course, segments: usize) -> Result<f64, Error> {
     const COARSEST_M: f64 = 0.1;
+    const FINEST_M: f64 = 1e-9; // what walls can be cut to
     const MOST_HALVINGS: usize = 40;
     let mut fine_m = COARSEST_M;
-    while segment_count(course, fine_m).unwrap_or(0) < segments {
-        fine_m /= 4.0;
-        segment_count(course, fine_m)?; // ends at the finest that walls can be cut
+    loop {
+        match segment_count(course, fine_m) {
+            Ok(count) if count >= segments => break,
+            finest if fine_m == FINEST_M => {
+                let (value, high) = (segments as f64, finest? as f64);
+                return Err(Error::OutOfRange {
+                    key: "segments".into(),
+                    value,
+                    low: 1.0,
+                    high,
+                });
+            }
+            _ => fine_m = (0.25 * fine_m).max(FINEST_M),
+        }
     }
     let mut coarse_m = 4.0 * fine_m;
     let mut best = (usize::MAX, fine_m);
@@ -36,7 +48,11 @@ pub fn max_error_for(course: &Course, segments: usize) -> Result<f64, Error> {
         if count == segments {
             break;
         }
-        if count > segments { fine_m = middle_m } else { coarse_m = middle_m }
+        if count > segments {
+            fine_m = middle_m
+        } else {
+            coarse_m = middle_m
+        }
     }
     Ok(best.1)
 }
@@ -46,7 +62,8 @@ pub fn max_error_for(course: &Course, segments: usize) -> Result<f64, Error> {
 /// # Errors
 /// A maximal error at which the walls cannot be cut.
 pub fn segment_count(course: &Course, max_error_m: f64) -> Result<usize, Error> {
-    Ok(course.outer.flatten(max_error_m)?.segments().len() + course.inner.flatten(max_error_m)?.segments().len())
+    Ok(course.outer.flatten(max_error_m)?.segments().len()
+        + course.inner.flatten(max_error_m)?.segments().len())
 }
 
 #[cfg(test)]
@@ -58,7 +75,11 @@ mod tests {
         let course = Course::from_toml(include_str!("../../../worlds/roduit2007/world.toml")).unwrap();
         for segments in [15, 33, 47, 105, 1000] {
             let max_error_m = max_error_for(&course, segments).unwrap();
-            assert_eq!(segment_count(&course, max_error_m).unwrap(), segments, "at {max_error_m} m");
+            assert_eq!(
+                segment_count(&course, max_error_m).unwrap(),
+                segments,
+                "at {max_error_m} m"
+            );
         }
     }
 }

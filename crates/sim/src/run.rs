@@ -379,7 +379,8 @@ pub struct Drive {
     pub steps: u64,
 }
 
-/// Drives until `laps` whole laps after the first are complete, or until the model's patience ends; `record` gets every step.
+/// Drives until `laps` whole laps after the first are complete, or until the model's patience ends; `record` gets every
+/// step and, after the last lap, a few more.
 ///
 /// # Errors
 /// An effect without values for this run.
@@ -410,10 +411,12 @@ pub fn drive(
     };
     // "As the first lap was much influenced by the initial position of the robot, it was always removed."
     let kept = done.split_off(done.len().min(1));
-    Ok(Drive {
-        laps: kept,
-        contacts: run.contacts,
-        timed_out,
-        steps: run.steps,
-    })
+    let (contacts, steps) = (run.contacts, run.steps);
+    if !timed_out {
+        (0..SPARE_STEPS).for_each(|_| record(&run.step()));
+    }
+    Ok(Drive { laps: kept, contacts, timed_out, steps })
 }
+
+/// Steps recorded after the last lap has closed, so that it also closes in a file whose positions are rounded.
+const SPARE_STEPS: usize = 8;

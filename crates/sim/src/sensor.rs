@@ -43,9 +43,11 @@ impl Response {
     /// ```
     pub fn reading(&self, distance_m: f64) -> f64 {
         match self {
-            Self::Improved { a_counts, d0_m, exponent } => {
-                a_counts / (1.0 + power(distance_m * (1.0 / d0_m), *exponent))
-            }
+            Self::Improved {
+                a_counts,
+                d0_m,
+                exponent,
+            } => a_counts / (1.0 + power(distance_m * (1.0 / d0_m), *exponent)),
             Self::Table(rows) => interpolate(rows, [distance_m])[0],
         }
     }
@@ -54,7 +56,11 @@ impl Response {
     #[inline]
     pub fn readings(&self, distances_m: &[f64; LANES]) -> Readings {
         match self {
-            Self::Improved { a_counts, d0_m, exponent } => {
+            Self::Improved {
+                a_counts,
+                d0_m,
+                exponent,
+            } => {
                 let per_m = 1.0 / d0_m;
                 distances_m.map(|d| a_counts / (1.0 + power(d * per_m, *exponent)))
             }
@@ -65,19 +71,33 @@ impl Response {
     /// The response taken at `factor` times the distance.
     pub fn at_scaled_distance(&self, factor: f64) -> Self {
         match self {
-            Self::Improved { a_counts, d0_m, exponent } => {
-                Self::Improved { a_counts: *a_counts, d0_m: d0_m / factor, exponent: *exponent }
+            Self::Improved {
+                a_counts,
+                d0_m,
+                exponent,
+            } => Self::Improved {
+                a_counts: *a_counts,
+                d0_m: d0_m / factor,
+                exponent: *exponent,
+            },
+            Self::Table(rows) => {
+                Self::Table(rows.iter().map(|[d, reading]| [d / factor, *reading]).collect())
             }
-            Self::Table(rows) => Self::Table(rows.iter().map(|[d, reading]| [d / factor, *reading]).collect()),
         }
     }
 
     /// The response with its exponent times `factor`; a table has none and stays.
     pub fn with_scaled_exponent(&self, factor: f64) -> Self {
         match self {
-            Self::Improved { a_counts, d0_m, exponent } => {
-                Self::Improved { a_counts: *a_counts, d0_m: *d0_m, exponent: exponent * factor }
-            }
+            Self::Improved {
+                a_counts,
+                d0_m,
+                exponent,
+            } => Self::Improved {
+                a_counts: *a_counts,
+                d0_m: *d0_m,
+                exponent: exponent * factor,
+            },
             Self::Table(_) => self.clone(),
         }
     }
@@ -87,7 +107,13 @@ impl Response {
 /// fill the processor's lanes and every machine computes the same bits; short chains, because the robot waits for it.
 #[inline(always)]
 fn power(x: f64, p: f64) -> f64 {
-    let value = exp2(p * log2(if x > f64::MIN_POSITIVE { x } else { f64::MIN_POSITIVE }));
+    let value = exp2(
+        p * log2(if x > f64::MIN_POSITIVE {
+            x
+        } else {
+            f64::MIN_POSITIVE
+        }),
+    );
     if x > 0.0 { value } else { 0.0 }
 }
 
@@ -156,12 +182,18 @@ const fn exp2_coefficients() -> [f64; 12] {
 /// Straight between the rows, held at the ends; all lanes go through all rows.
 #[inline]
 fn interpolate<const N: usize>(rows: &[[f64; 2]], x: [f64; N]) -> [f64; N] {
-    let Some(([_, first], [end, last])) = rows.first().zip(rows.last()) else { return [0.0; N] };
+    let Some(([_, first], [end, last])) = rows.first().zip(rows.last()) else {
+        return [0.0; N];
+    };
     let mut y = [*first; N];
     for pair in rows.windows(2) {
         let ([x0, y0], [x1, y1]) = (pair[0], pair[1]);
         for (y, x) in y.iter_mut().zip(x) {
-            *y = if x > x0 { y0 + (y1 - y0) * (x - x0) / (x1 - x0) } else { *y };
+            *y = if x > x0 {
+                y0 + (y1 - y0) * (x - x0) / (x1 - x0)
+            } else {
+                *y
+            };
         }
     }
     for (y, x) in y.iter_mut().zip(x) {
@@ -209,7 +241,10 @@ pub struct Beam {
 impl Beam {
     /// One ray along the axis.
     pub fn single() -> Self {
-        Self { rays: vec![(Vec2::X, 1.0)], combine: Combine::Responses }
+        Self {
+            rays: vec![(Vec2::X, 1.0)],
+            combine: Combine::Responses,
+        }
     }
 
     /// `count` rays at equal steps over the cone of `half_angle_rad` to either side of the axis, weighted by
@@ -220,11 +255,24 @@ impl Beam {
     /// A count of 0, or an angle outside [0, pi/2].
     pub fn cone(count: usize, half_angle_rad: f64, combine: Combine) -> Result<Self, Error> {
         if count == 0 {
-            return Err(Error::OutOfRange { key: "sensor.rays".into(), value: 0.0, low: 1.0, high: f64::INFINITY });
+            return Err(Error::OutOfRange {
+                key: "sensor.rays".into(),
+                value: 0.0,
+                low: 1.0,
+                high: f64::INFINITY,
+            });
         }
-        check("sensor.half_angle_rad", half_angle_rad, 0.0, std::f64::consts::FRAC_PI_2)?;
+        check(
+            "sensor.half_angle_rad",
+            half_angle_rad,
+            0.0,
+            std::f64::consts::FRAC_PI_2,
+        )?;
         if count == 1 || half_angle_rad == 0.0 {
-            return Ok(Self { combine, ..Self::single() });
+            return Ok(Self {
+                combine,
+                ..Self::single()
+            });
         }
         let share = |i: usize| (2.0 * i as f64 + 1.0) / count as f64 - 1.0; // in (-1, 1)
         let weight = |i: usize| (std::f64::consts::FRAC_PI_2 * share(i)).cos();
@@ -233,7 +281,10 @@ impl Beam {
             let angle = half_angle_rad * share(i);
             (Vec2::new(angle.cos(), angle.sin()), weight(i) / total)
         };
-        Ok(Self { rays: (0..count).map(ray).collect(), combine })
+        Ok(Self {
+            rays: (0..count).map(ray).collect(),
+            combine,
+        })
     }
 
     /// Directions from the axis as (cos, sin) with their weights.
@@ -244,14 +295,27 @@ impl Beam {
 
 /// Refuses a number outside [low, high], NaN included.
 pub(crate) fn check(key: &str, value: f64, low: f64, high: f64) -> Result<(), Error> {
-    if value >= low && value <= high { Ok(()) } else { Err(Error::OutOfRange { key: key.into(), value, low, high }) }
+    if value >= low && value <= high {
+        Ok(())
+    } else {
+        Err(Error::OutOfRange {
+            key: key.into(),
+            value,
+            low,
+            high,
+        })
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    const IMPROVED: Response = Response::Improved { a_counts: 4202.93, d0_m: 0.005_219_53, exponent: 1.572_816_92 };
+    const IMPROVED: Response = Response::Improved {
+        a_counts: 4202.93,
+        d0_m: 0.005_219_53,
+        exponent: 1.572_816_92,
+    };
 
     #[test]
     fn improved_response_by_hand() {
@@ -267,7 +331,11 @@ mod tests {
             let x = 1e-6 * 1.005_f64.powi(i); // to 460
             for p in [0.3, 1.0, 1.572_816_92, 4.0, 20.0] {
                 let expected = x.powf(p);
-                assert!((power(x, p) / expected - 1.0).abs() < 1e-13, "{x}^{p}: {} for {expected}", power(x, p));
+                assert!(
+                    (power(x, p) / expected - 1.0).abs() < 1e-13,
+                    "{x}^{p}: {} for {expected}",
+                    power(x, p)
+                );
             }
         }
         assert_eq!(power(0.0, 1.5), 0.0);
@@ -279,15 +347,29 @@ mod tests {
         let table = Response::Table(vec![[0.0, 3800.0], [0.04, 1200.0], [0.1, 300.0]]);
         for response in [IMPROVED, table] {
             let distances = [0.0, 1e-9, 0.003, 0.04, 0.05, 0.0999, 0.1, f64::INFINITY];
-            assert_eq!(response.readings(&distances), distances.map(|d| response.reading(d)));
+            assert_eq!(
+                response.readings(&distances),
+                distances.map(|d| response.reading(d))
+            );
         }
     }
 
     #[test]
     fn a_table_is_held_at_its_ends() {
         let table = Response::Table(vec![[0.01, 3800.0], [0.04, 1200.0], [0.1, 300.0]]);
-        for (d, reading) in [(0.0, 3800.0), (0.01, 3800.0), (0.04, 1200.0), (0.07, 750.0), (0.1, 300.0), (1.0, 300.0)] {
-            assert!((table.reading(d) - reading).abs() < 1e-9, "{d}: {}", table.reading(d));
+        for (d, reading) in [
+            (0.0, 3800.0),
+            (0.01, 3800.0),
+            (0.04, 1200.0),
+            (0.07, 750.0),
+            (0.1, 300.0),
+            (1.0, 300.0),
+        ] {
+            assert!(
+                (table.reading(d) - reading).abs() < 1e-9,
+                "{d}: {}",
+                table.reading(d)
+            );
         }
     }
 

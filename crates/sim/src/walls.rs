@@ -39,7 +39,12 @@ impl Walls {
             if thickness_m > 0.0 {
                 walls.push_boxes(side, chain, 0.5 * thickness_m);
             } else {
-                walls.push_outline(side, chain.segments().map(|(a, b)| (a.position, [a.fraction, b.fraction])));
+                walls.push_outline(
+                    side,
+                    chain
+                        .segments()
+                        .map(|(a, b)| (a.position, [a.fraction, b.fraction])),
+                );
             }
         }
         walls
@@ -52,7 +57,10 @@ impl Walls {
             let count = outline.len() as f64;
             walls.push_outline(
                 Side::Outer,
-                outline.iter().enumerate().map(|(i, &p)| (p, [i as f64 / count, (i + 1) as f64 / count])),
+                outline
+                    .iter()
+                    .enumerate()
+                    .map(|(i, &p)| (p, [i as f64 / count, (i + 1) as f64 / count])),
             );
         }
         walls
@@ -77,7 +85,9 @@ impl Walls {
 
     fn push_boxes(&mut self, side: Side, chain: &Chain, half_m: f64) {
         for (a, b) in chain.segments() {
-            let Some(along) = (b.position - a.position).try_normalize() else { continue };
+            let Some(along) = (b.position - a.position).try_normalize() else {
+                continue;
+            };
             let left = along.perp() * half_m;
             let (from, to) = (a.fraction, b.fraction);
             let corners = [
@@ -102,12 +112,16 @@ impl Walls {
 
     /// The numbers of all segments with their ends, m.
     pub fn segments(&self) -> impl Iterator<Item = (usize, Vec2, Vec2)> + '_ {
-        (0..self.pieces.len()).filter(|&i| self.pieces[i].is_some()).map(|i| (i, self.vertex(i), self.vertex(i + 1)))
+        (0..self.pieces.len())
+            .filter(|&i| self.pieces[i].is_some())
+            .map(|i| (i, self.vertex(i), self.vertex(i + 1)))
     }
 
     /// The numbers of the vertices of each outline, the repeated one included.
     pub(crate) fn outlines(&self) -> impl Iterator<Item = std::ops::Range<usize>> + '_ {
-        let ends = (0..self.pieces.len()).filter(|&i| self.pieces[i].is_none()).map(|i| i + 1);
+        let ends = (0..self.pieces.len())
+            .filter(|&i| self.pieces[i].is_none())
+            .map(|i| i + 1);
         let mut start = 0;
         ends.map(move |end| std::mem::replace(&mut start, end)..end)
     }
@@ -126,22 +140,30 @@ impl Walls {
 
     /// Unit vector across a segment, to the left of its direction.
     pub fn normal(&self, segment: usize) -> Vec2 {
-        (self.vertex(segment + 1) - self.vertex(segment)).normalize_or_zero().perp()
+        (self.vertex(segment + 1) - self.vertex(segment))
+            .normalize_or_zero()
+            .perp()
     }
 
     /// The place on the exact wall that a point of a segment stands for.
     pub fn place(&self, segment: usize, point: Vec2) -> WallPlace {
         let piece = self.pieces[segment].expect("a caster returns numbers of segments");
         let (a, b) = (self.vertex(segment), self.vertex(segment + 1));
-        let along = ((point - a).dot(b - a) / (b - a).length_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
+        let along =
+            ((point - a).dot(b - a) / (b - a).length_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
         let [from, to] = piece.fractions;
-        WallPlace { side: piece.side, fraction: (from + along * (to - from)).rem_euclid(1.0) }
+        WallPlace {
+            side: piece.side,
+            fraction: (from + along * (to - from)).rem_euclid(1.0),
+        }
     }
 
     /// Lower left and upper right corner of everything, m.
     pub(crate) fn bounds_m(&self) -> (Vec2, Vec2) {
         let start = (Vec2::splat(f64::INFINITY), Vec2::splat(f64::NEG_INFINITY));
-        (0..self.x_m.len()).map(|i| self.vertex(i)).fold(start, |(low, high), p| (low.min(p), high.max(p)))
+        (0..self.x_m.len())
+            .map(|i| self.vertex(i))
+            .fold(start, |(low, high), p| (low.min(p), high.max(p)))
     }
 }
 

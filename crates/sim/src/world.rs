@@ -103,6 +103,19 @@ impl Scene {
         })
     }
 
+    /// The scene with its walls cut at other corners, for sensors that see as far as the model's.
+    pub fn recut(&self, model: &Model, outer: Chain, inner: Chain) -> Self {
+        let walls = Walls::new(&outer, &inner, self.rules.thickness_m);
+        let declared = Arc::new(Geometry::new(walls, self.kind, &model.machine));
+        let range_m = model.machine.range_m;
+        Self { outer, inner, range_m, declared, ..self.clone() }
+    }
+
+    /// The corners at which the walls are cut: the outer wall's and the inner wall's.
+    pub fn chains(&self) -> [&Chain; 2] {
+        [&self.outer, &self.inner]
+    }
+
     /// The course and its gates.
     pub fn circuit(&self) -> &Circuit {
         &self.circuit

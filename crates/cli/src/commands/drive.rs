@@ -20,7 +20,7 @@ use crate::interrupt;
 pub(crate) fn run(session: &Session, args: &args::Drive) -> Result<()> {
     let file = setup::model_file(&args.model)?;
     let world = args.model.settings.world.as_deref();
-    let kind = args.caster.as_deref().and_then(CasterKind::from_name);
+    let kind = args.caster.as_deref().and_then(caster);
     let setup = Setup::load(&file, world, kind)?;
     let configuration = json!({
         "model": file.config, "seed": session.seed(), "runs": args.runs, "laps": args.laps, "log": args.log,
@@ -73,6 +73,11 @@ pub(crate) fn run(session: &Session, args: &args::Drive) -> Result<()> {
         session.remark(&remark);
     }
     if args.json { session.print_json(&document) } else { session.print(&text(args, &document)) }
+}
+
+/// The caster of that name.
+fn caster(name: &str) -> Option<CasterKind> {
+    CasterKind::NAMED.iter().find(|(known, _)| *known == name).map(|(_, kind)| *kind)
 }
 
 /// Drives one run and keeps its rows.

@@ -6,6 +6,7 @@ use flate2::write::GzEncoder;
 use proptest::prelude::*;
 use tempfile::TempDir;
 
+use super::write::run_csv;
 use super::*;
 use crate::output::sha256;
 

@@ -47,7 +47,7 @@ pub(crate) fn write_dataset(dir: &Path, set: &DataSetToWrite<'_>) -> Result<()> 
 }
 
 /// The text of `dataset.toml`.
-pub(crate) fn dataset_toml(set: &DataSetToWrite<'_>) -> String {
+fn dataset_toml(set: &DataSetToWrite<'_>) -> String {
     #[derive(Serialize)]
     struct Description<'a> {
         name: &'a str,
@@ -75,7 +75,7 @@ pub(crate) fn dataset_toml(set: &DataSetToWrite<'_>) -> String {
 ///
 /// # Errors
 /// Columns that differ in length.
-pub(crate) fn run_csv(rows: &Rows) -> Result<Vec<u8>> {
+pub(super) fn run_csv(rows: &Rows) -> Result<Vec<u8>> {
     let count = rows.t_s.len();
     let lengths = [rows.position_m.len()].into_iter().chain(
         rows.log

@@ -121,3 +121,24 @@ fn space(projections: &[Projection]) -> Result<Space> {
         ellipses: ellipses.collect::<Result<_, _>>()?,
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pairs_are_those_of_the_first_two_modes() {
+        let square = |x: f64| -> Vec<Vec<f64>> {
+            [[0.0, 0.0], [2.0, 0.0], [0.0, 2.0], [2.0, 2.0]]
+                .map(|[a, b]| vec![a + x, b])
+                .to_vec()
+        };
+        let [near, far] = [0.0, 4.0].map(|x| Cluster::new("square", &square(x)).unwrap());
+        let comparison = Comparison::new(&[vec![&near, &far], vec![&near, &near]]).unwrap();
+        let distance = comparison.distance(0, 1);
+        assert!((distance.first - 12_f64.sqrt()).abs() < 1e-12, "{distance:?}"); // 4 apart, variance 4/3
+        assert!(distance.low < 0.1 && comparison.draws[0].pair(0, 1).contrast < 1e-12);
+        let differ = comparison.tally(|draw| draw.differ(0, 1));
+        assert_eq!((differ.times, differ.draws), (1, 2));
+    }
+}

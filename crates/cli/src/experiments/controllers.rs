@@ -276,8 +276,6 @@ fn claims(real: &Controllers, simulated: &Controllers, lower: LowerHalf) -> Vec<
             ),
             lower.difference >= 2.0 / 3.0,
         ),
-            lower.difference > lower.gates,
-        ),
         Claim::counted(
             "The classification that simulation reaches is reached on the measured laps too",
             "100 % in both",

@@ -159,3 +159,31 @@ impl Distances {
         )
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_papers_numbers_stand_beside_ours() {
+        let row = Row {
+            key: "improved".into(),
+            name: "improved sensor".into(),
+            paper: Some(published::IMPROVED),
+            here: vec![Estimate::of(&[1.0, 3.0]), Estimate::of(&[4.0])],
+        };
+        let runs = vec!["d".to_owned(), "x".to_owned()]; // the paper has no run x
+        let distances = Distances {
+            title: "T".into(),
+            runs,
+            rows: vec![row],
+        };
+        let table = distances.table();
+        assert_eq!(table.rows[0], ["improved sensor, paper", "0.5", "-"]);
+        assert_eq!(table.rows[1][2], "4.0");
+        assert_eq!(distances.json()["improved"]["d"]["paper"], 0.5);
+        assert_eq!(distances.json()["improved"]["x"]["distance"], 4.0);
+        assert!(distances.csv().ends_with("improved,x,,4,4,4,4\n"));
+        assert!(distances.figure().to_svg().is_ok());
+    }
+}

@@ -374,3 +374,21 @@ fn simulate(plan: &Plan<'_>, streams: Streams, laps: usize) -> Result<Simulated>
         run,
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_draw_is_planned_in_the_order_in_which_it_is_taken_apart() {
+        let measured = Measurements::load(&[]).unwrap();
+        let (standard, rule_based) = (measured.standard().unwrap(), measured.rule_based().unwrap());
+        let setups = setups(&standard, &rule_based, &measured.circuit).unwrap();
+        let names: Vec<String> = plans(&setups).into_iter().map(|plan| plan.name).collect();
+        assert_eq!(names.len(), Study::RUNS_PER_DRAW);
+        assert!(names[..RUNS].iter().all(|name| name == "standard"));
+        assert!(names[RUNS..2 * RUNS].iter().all(|name| name == "rule-based"));
+        assert_eq!(names[2 * RUNS..], Variant::OTHERS.map(Variant::name));
+        assert_eq!(measured.inputs().len(), 11); // two descriptions, eight runs, the world
+    }
+}

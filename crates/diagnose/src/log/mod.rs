@@ -31,6 +31,33 @@ pub fn debug_search(model: &Model, scene: &Scene, runs: &[Vec<LogRow>]) -> Vec<(
     let ev = evidence::Evidence::new(&wide, model, &refs).unwrap();
     let traces = ev.traces(&[]).unwrap();
     eprintln!("base {:?}", t.elapsed());
+    if std::env::var("ERRSCAN").is_ok() {
+        let l0: f64 = traces.iter().map(|t| t.1.log_likelihood).sum();
+        let text = std::fs::read_to_string(std::env::var("ERRSCAN").unwrap()).unwrap();
+        for line in text.lines() {
+            let mut it = line.split(';');
+            let label = it.next().unwrap();
+            let chain = |t: &str, side: Side| {
+                let wall = scene.circuit().course.wall(side);
+                let vertices = t.split(' ').map(|p| {
+                    let (x, y) = p.split_once(',').unwrap();
+                    let position = sim::Vec2::new(x.parse().unwrap(), y.parse().unwrap());
+                    let fraction = (0..20000).map(|i| f64::from(i) / 20000.0).min_by(|a, b| wall.point(*a).distance(position).total_cmp(&wall.point(*b).distance(position))).unwrap();
+                    track::Vertex { position, left_normal: wall.left_normal(fraction), fraction }
+                }).collect();
+                track::Chain { vertices }
+            };
+            let o = chain(it.next().unwrap(), Side::Outer);
+            let i = chain(it.next().unwrap(), Side::Inner);
+            let mut m = model.clone();
+            m.machine.range_m *= 1.2;
+            let sc = wide.recut(&m, o, i);
+            let ev2 = evidence::Evidence { scene: &sc, model, stretches: ev.of_run(0).stretches.into_iter().chain(ev.of_run(1).stretches).chain(ev.of_run(2).stretches).chain(ev.of_run(3).stretches).collect() };
+            let l: f64 = ev2.traces(&[]).unwrap().iter().map(|t| t.1.log_likelihood).sum();
+            eprintln!("{label}: {:.1} segs {}", l - l0, sc.walls().len());
+        }
+        return vec![];
+    }
     let base: Vec<f64> = traces.iter().map(|t| t.1.log_likelihood).collect();
     let lengths = [Side::Outer, Side::Inner].map(|s| scene.circuit().course.wall(s).length_m());
     let variants = catalogue::variants(lengths);

@@ -20,7 +20,10 @@ impl Bvh {
         let vertices: Vec<Vec2> = (0..count).map(|i| walls.vertex(i)).collect();
         let numbers: Vec<u32> = walls.segments().map(|(i, ..)| i as u32).collect();
         let indices = numbers.iter().map(|&i| [i, i + 1]).collect();
-        Self { polyline: Polyline::new(vertices, Some(indices)), numbers }
+        Self {
+            polyline: Polyline::new(vertices, Some(indices)),
+            numbers,
+        }
     }
 
     pub(super) fn cast(&self, rays: &Rays, range_m: f64) -> Hits {

@@ -44,7 +44,11 @@ impl<F: FnMut() -> f64> Uniform<F> {
 
     fn circuit(&mut self) -> Vec<Vec<Vec2>> {
         let count = [7, 47, 105, 900][self.index(4)];
-        let (waves, height, width_m) = (self.index(5) as f64, self.between(0.0, 0.2), self.between(0.08, 0.2));
+        let (waves, height, width_m) = (
+            self.index(5) as f64,
+            self.between(0.0, 0.2),
+            self.between(0.08, 0.2),
+        );
         let ring = |inset_m: f64| {
             let at = |i: usize| {
                 let angle = std::f64::consts::TAU * i as f64 / count as f64;
@@ -75,7 +79,12 @@ impl<F: FnMut() -> f64> Uniform<F> {
     fn square(&mut self) -> Vec<Vec2> {
         let mut grid = || (self.index(65) as f64 - 32.0) / 64.0;
         let (x, y, size) = (grid(), grid(), grid().abs() + 1.0 / 64.0);
-        vec![Vec2::new(x, y), Vec2::new(x + size, y), Vec2::new(x + size, y + size), Vec2::new(x, y + size)]
+        vec![
+            Vec2::new(x, y),
+            Vec2::new(x + size, y),
+            Vec2::new(x + size, y + size),
+            Vec2::new(x, y + size),
+        ]
     }
 
     /// A robot's centre near a wall and eight rays about it: at random, through joints, along segments or grazing them

@@ -16,9 +16,16 @@ pub(crate) struct Cells {
 
 impl Cells {
     pub(crate) fn new(walls: &Walls, disc_m: f64) -> Self {
-        let strip = |(number, from, to)| Strip { number, from, to, slack_m: 0.0 };
+        let strip = |(number, from, to)| Strip {
+            number,
+            from,
+            to,
+            slack_m: 0.0,
+        };
         let strips: Vec<Strip> = walls.segments().map(strip).collect();
-        Self { near: Neighbours::new(walls.bounds_m(), disc_m, &strips) }
+        Self {
+            near: Neighbours::new(walls.bounds_m(), disc_m, &strips),
+        }
     }
 
     /// Eight rays at once against each vertex and segment near the robot's centre.
@@ -45,7 +52,10 @@ impl Cells {
             }
         }
         // A whole number below 2^32 plus 2^52 stands in the lowest bits: no conversion, all lanes at once.
-        Hits { distance_m: nearest, segment: number.map(|n| (n + 4_503_599_627_370_496.0).to_bits() as u32) }
+        Hits {
+            distance_m: nearest,
+            segment: number.map(|n| (n + 4_503_599_627_370_496.0).to_bits() as u32),
+        }
     }
 
     /// The nearest point of a wall if it is closer than `radius_m`, which is at most the disc the cells are made for.

@@ -21,7 +21,13 @@ impl Grid {
     pub(super) fn new(low: Vec2, high: Vec2, cell_m: f64) -> Self {
         let size = (high - low) / cell_m;
         let (columns, rows) = (size.x.ceil().max(1.0) as usize, size.y.ceil().max(1.0) as usize);
-        Self { low, cell_m, per_m: 1.0 / cell_m, columns, rows }
+        Self {
+            low,
+            cell_m,
+            per_m: 1.0 / cell_m,
+            columns,
+            rows,
+        }
     }
 
     pub(super) fn len(&self) -> usize {
@@ -91,7 +97,9 @@ impl Neighbours {
         let within_m = disc_m + cell_m * (0.5_f64.sqrt() + 1e-9);
         let mut entries = Vec::with_capacity(4 * grid.len()); // (cell, number), in rising order of the numbers
         for strip in strips {
-            near(&grid, strip, within_m + strip.slack_m, |cell| entries.push((cell, strip.number as u32)));
+            near(&grid, strip, within_m + strip.slack_m, |cell| {
+                entries.push((cell, strip.number as u32))
+            });
         }
         let (starts, runs) = runs(grid.len(), &entries);
         Self { grid, starts, runs }

@@ -82,7 +82,10 @@ pub struct Hits {
 
 impl Hits {
     /// No wall anywhere.
-    pub const NONE: Self = Self { distance_m: [f64::INFINITY; LANES], segment: [0; LANES] };
+    pub const NONE: Self = Self {
+        distance_m: [f64::INFINITY; LANES],
+        segment: [0; LANES],
+    };
 }
 
 /// Side and advance of a vertex as seen from a ray: the cross and the dot product of the ray's direction with the
@@ -91,7 +94,10 @@ impl Hits {
 #[inline(always)]
 fn sight(origin: (f64, f64), direction: (f64, f64), vertex: (f64, f64)) -> (f64, f64) {
     let (x, y) = (vertex.0 - origin.0, vertex.1 - origin.1);
-    (direction.0 * y - direction.1 * x, direction.0 * x + direction.1 * y)
+    (
+        direction.0 * y - direction.1 * x,
+        direction.0 * x + direction.1 * y,
+    )
 }
 
 /// Distance along a ray to the segment between two vertices seen at `(side, advance)`, or infinity.
@@ -103,7 +109,11 @@ fn sight(origin: (f64, f64), direction: (f64, f64), vertex: (f64, f64)) -> (f64,
 #[inline(always)]
 fn crossing(from: (f64, f64), to: (f64, f64)) -> f64 {
     let distance = from.1 + (to.1 - from.1) * (from.0 / (from.0 - to.0));
-    if ((from.0 >= 0.0) != (to.0 >= 0.0)) & (distance >= 0.0) { distance } else { f64::INFINITY }
+    if ((from.0 >= 0.0) != (to.0 >= 0.0)) & (distance >= 0.0) {
+        distance
+    } else {
+        f64::INFINITY
+    }
 }
 
 /// Distance along the ray to the segment, m, or infinity: the one intersection that all casters of ours share.
@@ -116,7 +126,10 @@ fn crossing(from: (f64, f64), to: (f64, f64)) -> f64 {
 #[inline]
 pub fn segment_distance_m(origin: Vec2, direction: Vec2, a: Vec2, b: Vec2) -> f64 {
     let (origin, direction) = ((origin.x, origin.y), (direction.x, direction.y));
-    crossing(sight(origin, direction, (a.x, a.y)), sight(origin, direction, (b.x, b.y)))
+    crossing(
+        sight(origin, direction, (a.x, a.y)),
+        sight(origin, direction, (b.x, b.y)),
+    )
 }
 
 /// The ways to cast rays.
@@ -146,17 +159,19 @@ impl CasterKind {
     fn for_walls(walls: &Walls, range_m: f64) -> Self {
         const LONG_SEGMENT: f64 = 0.16;
         let length_m: f64 = walls.segments().map(|(_, a, b)| a.distance(b)).sum();
-        if length_m < LONG_SEGMENT * range_m * walls.len() as f64 { Self::Tree } else { Self::Cells }
-    }
-
-    /// The kind of that name.
-    pub fn from_name(name: &str) -> Option<Self> {
-        Self::NAMED.iter().find(|(known, _)| *known == name).map(|(_, kind)| *kind)
+        if length_m < LONG_SEGMENT * range_m * walls.len() as f64 {
+            Self::Tree
+        } else {
+            Self::Cells
+        }
     }
 
     /// The name a user gives this kind.
     pub fn name(self) -> &'static str {
-        Self::NAMED.iter().find(|(_, kind)| *kind == self).map_or("", |(name, _)| name)
+        Self::NAMED
+            .iter()
+            .find(|(_, kind)| *kind == self)
+            .map_or("", |(name, _)| name)
     }
 }
 
@@ -209,7 +224,11 @@ impl Caster {
             Method::Tree(tree) => tree.cast(center, rays, self.range_m),
         };
         for distance in &mut hits.distance_m {
-            *distance = if *distance <= self.range_m { *distance } else { f64::INFINITY };
+            *distance = if *distance <= self.range_m {
+                *distance
+            } else {
+                f64::INFINITY
+            };
         }
         hits
     }

@@ -17,7 +17,12 @@ fn agree(walls: &Walls, rays: &Rays, a: &Hits, b: &Hits) -> bool {
     (0..LANES).all(|i| {
         let distance = |hits: &Hits| {
             let segment = hits.segment[i] as usize;
-            segment_distance_m(rays.origin(i), rays.direction(i), walls.vertex(segment), walls.vertex(segment + 1))
+            segment_distance_m(
+                rays.origin(i),
+                rays.direction(i),
+                walls.vertex(segment),
+                walls.vertex(segment + 1),
+            )
         };
         a.distance_m[i].to_bits() == b.distance_m[i].to_bits()
             && (a.distance_m[i].is_infinite() || distance(a).to_bits() == distance(b).to_bits())
@@ -31,7 +36,10 @@ fn is_plain(walls: &Walls, rays: &Rays, hits: &Hits, i: usize) -> bool {
     }
     let segment = hits.segment[i] as usize;
     let point = rays.origin(i) + rays.direction(i) * hits.distance_m[i];
-    let off_ends = point.distance(walls.vertex(segment)).min(point.distance(walls.vertex(segment + 1))) > 1e-9;
+    let off_ends = point
+        .distance(walls.vertex(segment))
+        .min(point.distance(walls.vertex(segment + 1)))
+        > 1e-9;
     let steep = walls.normal(segment).dot(rays.direction(i)).abs() > 0.0175;
     off_ends && steep && (RANGE_M - hits.distance_m[i]).abs() > 1e-9 && hits.distance_m[i] > 1e-9
 }
@@ -68,7 +76,12 @@ proptest! {
 #[test]
 fn a_wall_at_exactly_the_range_is_seen_and_one_beyond_is_not() {
     let x = RANGE_M;
-    let square = vec![Vec2::new(x, -1.0), Vec2::new(x + 1.0, -1.0), Vec2::new(x + 1.0, 1.0), Vec2::new(x, 1.0)];
+    let square = vec![
+        Vec2::new(x, -1.0),
+        Vec2::new(x + 1.0, -1.0),
+        Vec2::new(x + 1.0, 1.0),
+        Vec2::new(x, 1.0),
+    ];
     let walls = Walls::from_outlines(&[square]);
     for kind in CasterKind::NAMED.map(|(_, kind)| kind) {
         for (origin, expected) in [(0.0, x), (-f64::EPSILON, f64::INFINITY), (0.5 * x, 0.5 * x)] {
@@ -81,27 +94,51 @@ fn a_wall_at_exactly_the_range_is_seen_and_one_beyond_is_not() {
 
 #[test]
 fn rays_do_not_slip_through_joints_nor_see_a_segment_end_on() {
-    let square = vec![Vec2::new(0.0, 0.0), Vec2::new(0.1, 0.0), Vec2::new(0.1, 0.1), Vec2::new(0.0, 0.1)];
+    let square = vec![
+        Vec2::new(0.0, 0.0),
+        Vec2::new(0.1, 0.0),
+        Vec2::new(0.1, 0.1),
+        Vec2::new(0.0, 0.1),
+    ];
     let walls = Walls::from_outlines(&[square]);
     let inside = Vec2::new(0.05, 0.05);
     let corner = (Vec2::new(0.1, 0.1) - inside).normalize();
     for kind in OURS {
         let cast = |origin, direction| {
-            caster(kind, &walls).cast(&walls, inside, &Rays::new([(origin, direction); LANES])).distance_m[0]
+            caster(kind, &walls)
+                .cast(&walls, inside, &Rays::new([(origin, direction); LANES]))
+                .distance_m[0]
         };
-        assert!((cast(inside, corner) - 0.005_f64.sqrt()).abs() < 1e-15, "{kind:?}");
+        assert!(
+            (cast(inside, corner) - 0.005_f64.sqrt()).abs() < 1e-15,
+            "{kind:?}"
+        );
         // Along a side, from its middle: seen is the corner where the chain turns to the right.
-        assert!((cast(Vec2::new(0.05, 0.1), Vec2::X) - 0.05).abs() < 1e-15, "{kind:?}");
-        assert_eq!(cast(Vec2::new(0.05, 0.0), Vec2::X), f64::INFINITY, "{kind:?} touches it from the left");
+        assert!(
+            (cast(Vec2::new(0.05, 0.1), Vec2::X) - 0.05).abs() < 1e-15,
+            "{kind:?}"
+        );
+        assert_eq!(
+            cast(Vec2::new(0.05, 0.0), Vec2::X),
+            f64::INFINITY,
+            "{kind:?} touches it from the left"
+        );
     }
 }
 
 #[test]
 fn nothing_is_seen_where_there_is_nothing() {
-    for walls in [Walls::default(), Walls::from_outlines(&[vec![Vec2::splat(9.0), Vec2::splat(9.5), Vec2::X * 9.0]])] {
+    for walls in [
+        Walls::default(),
+        Walls::from_outlines(&[vec![Vec2::splat(9.0), Vec2::splat(9.5), Vec2::X * 9.0]]),
+    ] {
         for kind in CasterKind::NAMED.map(|(_, kind)| kind) {
             let rays = Rays::new([(Vec2::ZERO, Vec2::X); LANES]);
-            assert_eq!(caster(kind, &walls).cast(&walls, Vec2::ZERO, &rays).distance_m, [f64::INFINITY; LANES], "{kind:?}");
+            assert_eq!(
+                caster(kind, &walls).cast(&walls, Vec2::ZERO, &rays).distance_m,
+                [f64::INFINITY; LANES],
+                "{kind:?}"
+            );
         }
     }
 }
@@ -109,10 +146,22 @@ fn nothing_is_seen_where_there_is_nothing() {
 #[test]
 fn the_caster_is_chosen_by_the_walls() {
     let course = Course::from_toml(include_str!("../../../../worlds/roduit2007/world.toml")).unwrap();
-    for (max_error_m, expected) in [(0.05, CasterKind::Cells), (0.001, CasterKind::Cells), (1e-5, CasterKind::Tree)] {
-        let chains = (course.outer.flatten(max_error_m).unwrap(), course.inner.flatten(max_error_m).unwrap());
+    for (max_error_m, expected) in [
+        (0.05, CasterKind::Cells),
+        (0.001, CasterKind::Cells),
+        (1e-5, CasterKind::Tree),
+    ] {
+        let chains = (
+            course.outer.flatten(max_error_m).unwrap(),
+            course.inner.flatten(max_error_m).unwrap(),
+        );
         let walls = Walls::new(&chains.0, &chains.1, 0.0);
-        assert_eq!(Caster::new(None, &walls, 0.1, 0.035).kind(), expected, "{} segments", walls.len());
+        assert_eq!(
+            Caster::new(None, &walls, 0.1, 0.035).kind(),
+            expected,
+            "{} segments",
+            walls.len()
+        );
     }
 }
 

@@ -14,8 +14,14 @@ use crate::walls::nearest_on_segment;
 /// Eight rays at once are held against the chords near the robot; a ray that may meet one goes down its tree alone,
 /// against eight smaller stretches at once and at last against eight segments.
 #[derive(Debug, Clone)]
-pub(crate) struct Tree {
+pub(super) struct Tree {
     near: Neighbours,
+    stretches: Stretches,
+}
+
+/// All stretches.
+#[derive(Debug, Clone)]
+struct Stretches {
     /// Ends of the stretches at the top, as in [`Walls`]: stretch `i` from vertex `i` to vertex `i + 1`.
     x_m: Vec<f64>,
     y_m: Vec<f64>,
@@ -44,43 +50,105 @@ const MARGIN_M: f64 = 1e-9;
 /// The length of the chords at the top, m, is between this and an eighth of it: measured by benches/ray_cast.rs.
 const TOP_CHORD_M: f64 = 0.08;
 
-/// One ray in all lanes.
-#[derive(Clone, Copy)]
-struct Ray {
+/// Eight rays, one a lane, or one ray in all lanes.
+#[derive(Debug, Clone, Copy)]
+struct Lanes {
     origin: (f64x8, f64x8),
     direction: (f64x8, f64x8),
-    of: ((f64, f64), (f64, f64)),
 }
+
+/// One ray: in all lanes, and by itself.
+#[derive(Debug, Clone, Copy)]
+struct Ray {
+    lanes: Lanes,
+    origin: (f64, f64),
+    direction: (f64, f64),
+}
+
+/// Where the list of an outline's stretches ends.
+const NONE: u32 = u32::MAX;
 
 /// Stretches whose eight bits each fit in one word.
 const CHUNK: usize = 8;
 
 impl Tree {
-    pub(crate) fn new(walls: &Walls, disc_m: f64) -> Self {
+    /// The tree over the walls for rays that stay within `disc_m` of the robot's centre.
+    pub(super) fn new(walls: &Walls, disc_m: f64) -> Self {
+        let stretches = Stretches::new(walls);
+        let strips: Vec<Strip> = stretches.strips().collect();
+        Self {
+            near: Neighbours::new(walls.bounds_m(), disc_m, &strips),
+            stretches,
+        }
+    }
+
+    /// Eight rays at once against the stretches near the robot's centre.
+    #[inline]
+    pub(super) fn cast(&self, center: Vec2, rays: &Rays, range_m: f64) -> Hits {
+        let mut nearest = [(f64::INFINITY, 0); LANES];
+        let top_level = self.stretches.levels.len() - 1;
+        let all = Lanes::all(rays);
+        for &(first, last) in self.near.runs(center) {
+            let mut first = first as usize;
+            while first < last as usize {
+                let end = (first + CHUNK).min(last as usize);
+                let mut found = self.stretches.found(&all, first, end, range_m);
+                while found != 0 {
+                    let bit = found.trailing_zeros() as usize;
+                    found &= found - 1;
+                    let (stretch, lane) = (first + bit / LANES, bit % LANES);
+                    let ray = Ray::one(rays, lane);
+                    self.stretches.descend(
+                        &ray,
+                        top_level,
+                        self.stretches.top[stretch] as usize,
+                        range_m,
+                        &mut nearest[lane],
+                    );
+                }
+                first = end;
+            }
+        }
+        Hits {
+            distance_m: nearest.map(|n| n.0),
+            segment: nearest.map(|n| n.1),
+        }
+    }
+}
+
+impl Stretches {
+    fn new(walls: &Walls) -> Self {
         let length_m: f64 = walls.segments().map(|(_, a, b)| a.distance(b)).sum();
         let mean_m = length_m / walls.len().max(1) as f64;
-        let depth = (1..8).take_while(|&d| mean_m * 8_f64.powi(d) <= TOP_CHORD_M).count().max(1);
-        let mut tree = Self {
-            near: Neighbours::new((Vec2::ZERO, Vec2::ZERO), disc_m, &[]),
+        let depth = (1..8)
+            .take_while(|&d| mean_m * 8_f64.powi(d) <= TOP_CHORD_M)
+            .count()
+            .max(1);
+        let levels = vec![vec![]; depth];
+        let mut stretches = Self {
             x_m: vec![],
             y_m: vec![],
             slack_m: vec![],
             top: vec![],
-            levels: vec![vec![]; depth],
+            levels,
         };
         for outline in walls.outlines() {
-            tree.push(walls, outline);
+            stretches.push(walls, outline);
         }
-        let strip = |i: usize| Strip {
-            number: i,
-            from: Vec2::new(tree.x_m[i], tree.y_m[i]),
-            to: Vec2::new(tree.x_m[i + 1], tree.y_m[i + 1]),
-            slack_m: tree.slack_m[i],
-        };
-        let strips: Vec<Strip> =
-            (0..tree.top.len()).filter(|&i| tree.top[i] != u32::MAX).map(strip).collect();
-        tree.near = Neighbours::new(walls.bounds_m(), disc_m, &strips);
-        tree
+        stretches
+    }
+
+    /// The stretches at the top, as the grid wants them.
+    fn strips(&self) -> impl Iterator<Item = Strip> + '_ {
+        let vertex = |i: usize| Vec2::new(self.x_m[i], self.y_m[i]);
+        (0..self.top.len())
+            .filter(|&i| self.top[i] != NONE)
+            .map(move |i| Strip {
+                number: i,
+                from: vertex(i),
+                to: vertex(i + 1),
+                slack_m: self.slack_m[i],
+            })
     }
 
     /// Adds the closed outline of the given vertices, the last of which is the first again.
@@ -110,36 +178,13 @@ impl Tree {
             self.x_m.push(walls.vertex(from).x);
             self.y_m.push(walls.vertex(from).y);
             self.slack_m.push(slack_m(walls, from, to));
-            self.top.push(if i < tops { (below + i) as u32 } else { u32::MAX });
+            self.top.push(if i < tops { (below + i) as u32 } else { NONE });
         }
-    }
-
-    /// Eight rays at once against the stretches near the robot's centre.
-    #[inline]
-    pub(super) fn cast(&self, center: Vec2, rays: &Rays, range_m: f64) -> Hits {
-        let mut nearest = [(f64::INFINITY, 0); LANES];
-        let all = Ray::all(rays);
-        for &(first, last) in self.near.runs(center) {
-            let mut first = first as usize;
-            while first < last as usize {
-                let end = (first + CHUNK).min(last as usize);
-                let mut found = self.found(&all, first, end, range_m);
-                while found != 0 {
-                    let bit = found.trailing_zeros() as usize;
-                    found &= found - 1;
-                    let (stretch, lane) = (first + bit / LANES, bit % LANES);
-                    let ray = Ray::one(rays, lane);
-                    self.descend(&ray, self.levels.len() - 1, self.top[stretch] as usize, range_m, &mut nearest[lane]);
-                }
-                first = end;
-            }
-        }
-        Hits { distance_m: nearest.map(|n| n.0), segment: nearest.map(|n| n.1) }
     }
 
     /// The stretches from `first` to before `end` that eight rays may meet, as eight bits for each stretch.
     #[inline(always)]
-    fn found(&self, all: &Ray, first: usize, end: usize, range_m: f64) -> u64 {
+    fn found(&self, all: &Lanes, first: usize, end: usize, range_m: f64) -> u64 {
         let (xs, ys) = (&self.x_m[first..=end], &self.y_m[first..=end]);
         let slacks = &self.slack_m[first..end];
         let limit = f64x8::splat(range_m);
@@ -180,12 +225,12 @@ impl Node {
     /// The nearest of the eight segments, if it is nearer than what is known.
     #[inline]
     fn hit(&self, ray: &Ray, nearest: &mut (f64, u32)) {
-        let (from, to) = (self.sides(ray, 0), self.sides(ray, 1));
+        let ((from, _), (to, _)) = self.sights(ray);
         let mut crossed = from.simd_ge(f64x8::ZERO).to_bitmask() ^ to.simd_ge(f64x8::ZERO).to_bitmask();
         while crossed != 0 {
             let i = crossed.trailing_zeros() as usize & 7;
             crossed &= crossed - 1;
-            let sight = |i: usize| super::sight(ray.of.0, ray.of.1, (self.x_m[i], self.y_m[i]));
+            let sight = |i: usize| super::sight(ray.origin, ray.direction, (self.x_m[i], self.y_m[i]));
             let distance = super::crossing(sight(i), sight(i + 1));
             if distance < nearest.0 {
                 *nearest = (distance, self.first + i as u32);
@@ -193,21 +238,14 @@ impl Node {
         }
     }
 
-    #[inline(always)]
-    fn sides(&self, ray: &Ray, i: usize) -> f64x8 {
-        let lanes = |values: &[f64; LANES + 1]| -> f64x8 {
-            f64x8::from(<[f64; LANES]>::try_from(&values[i..i + LANES]).expect("eight of nine"))
-        };
-        let (x, y) = (lanes(&self.x_m) - ray.origin.0, lanes(&self.y_m) - ray.origin.1);
-        ray.direction.0 * y - ray.direction.1 * x
-    }
-
+    /// Where the stretches begin and end.
     #[inline(always)]
     fn sights(&self, ray: &Ray) -> (Sight, Sight) {
         let lanes = |values: &[f64; LANES + 1], i: usize| -> f64x8 {
             f64x8::from(<[f64; LANES]>::try_from(&values[i..i + LANES]).expect("eight of nine"))
         };
-        (ray.sight(lanes(&self.x_m, 0), lanes(&self.y_m, 0)), ray.sight(lanes(&self.x_m, 1), lanes(&self.y_m, 1)))
+        let sight = |i: usize| ray.lanes.sight(lanes(&self.x_m, i), lanes(&self.y_m, i));
+        (sight(0), sight(1))
     }
 }
 
@@ -215,23 +253,30 @@ impl Node {
 type Sight = (f64x8, f64x8);
 
 impl Ray {
+    /// Number `i` of eight rays.
+    #[inline(always)]
+    fn one(rays: &Rays, i: usize) -> Self {
+        let origin = (rays.origin_x[i], rays.origin_y[i]);
+        let direction = (rays.direction_x[i], rays.direction_y[i]);
+        let splat = |(x, y)| (f64x8::splat(x), f64x8::splat(y));
+        Self {
+            lanes: Lanes {
+                origin: splat(origin),
+                direction: splat(direction),
+            },
+            origin,
+            direction,
+        }
+    }
+}
+
+impl Lanes {
     /// Eight rays, one a lane.
     #[inline(always)]
     fn all(rays: &Rays) -> Self {
         Self {
             origin: (f64x8::from(rays.origin_x), f64x8::from(rays.origin_y)),
             direction: (f64x8::from(rays.direction_x), f64x8::from(rays.direction_y)),
-            of: ((0.0, 0.0), (0.0, 0.0)),
-        }
-    }
-
-    /// One of eight rays in all lanes.
-    #[inline(always)]
-    fn one(rays: &Rays, i: usize) -> Self {
-        Self {
-            origin: (f64x8::splat(rays.origin_x[i]), f64x8::splat(rays.origin_y[i])),
-            direction: (f64x8::splat(rays.direction_x[i]), f64x8::splat(rays.direction_y[i])),
-            of: ((rays.origin_x[i], rays.origin_y[i]), (rays.direction_x[i], rays.direction_y[i])),
         }
     }
 
@@ -239,7 +284,10 @@ impl Ray {
     #[inline(always)]
     fn sight(&self, x: f64x8, y: f64x8) -> Sight {
         let (x, y) = (x - self.origin.0, y - self.origin.1);
-        (self.direction.0 * y - self.direction.1 * x, self.direction.0 * x + self.direction.1 * y)
+        (
+            self.direction.0 * y - self.direction.1 * x,
+            self.direction.0 * x + self.direction.1 * y,
+        )
     }
 }
 

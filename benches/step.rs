@@ -1,0 +1,51 @@
+//! One control step of both controllers against 15 to 1000 segments, with one ray per sensor and with many; a lap; and
+//! what it costs to cut a circuit and to make a variant of it.
+
+mod ground;
+
+use std::hint::black_box;
+use std::sync::Arc;
+
+use criterion::Criterion;
+use ground::{braitenberg, circuit, model, rule_based};
+use sim::{Beam, Circuit, Combine, Model, Run, Scene, Streams, max_error_for};
+
+fn main() {
+    let mut criterion = Criterion::default().configure_from_args();
+    let circuit = circuit();
+    for segments in [15, 47, 105, 1000] {
+        let max_error_m =
+            max_error_for(&circuit.course, segments).expect("the shipped circuit can be cut that fine");
+        for (name, controller) in [("braitenberg", braitenberg()), ("rule-based", rule_based())] {
+            step(
+                &mut criterion,
+                &format!("step/{name}/{segments}"),
+                &circuit,
+                &model(controller, max_error_m),
+            );
+        }
+        let declared = model(braitenberg(), max_error_m);
+        criterion.bench_function(&format!("scene/{segments}"), |bencher| {
+            bencher.iter(|| Scene::new(Arc::clone(&circuit), black_box(&declared), None));
+        });
+    }
+    for rays in [1, 3, 10, 30, 100] {
+        let mut wide = model(braitenberg(), 0.005);
+        wide.machine.beam = Beam::cone(rays, 0.3, Combine::Responses).expect("a cone in range");
+        step(
+            &mut criterion,
+            &format!("step/rays-per-sensor/{rays}"),
+            &circuit,
+            &wide,
+        );
+    }
+    criterion.final_summary();
+}
+
+fn step(criterion: &mut Criterion, name: &str, circuit: &Arc<Circuit>, model: &Model) {
+    let scene =
+        Scene::new(Arc::clone(circuit), model, None).expect("the shipped model fits the shipped world");
+    let world = scene.world(model, 0).expect("no effects, no error");
+    let mut run = Run::new(&world, Streams { seed: 1, run: 0 }).expect("no effects, no error");
+    criterion.bench_function(name, |bencher| bencher.iter(|| black_box(run.step())));
+}
