@@ -4,14 +4,25 @@ use serde_json::Value;
 
 use crate::support::{Scratch, measured};
 
-const COMMANDS: [&str; 7] = ["reproduce", "drive", "compare", "sweep", "world", "fit-sensor", "effects"];
+const COMMANDS: [&str; 7] = [
+    "reproduce",
+    "drive",
+    "compare",
+    "sweep",
+    "world",
+    "fit-sensor",
+    "effects",
+];
 
 #[test]
 fn every_command_teaches_itself() {
     let scratch = Scratch::new();
     let overview = scratch.done(["--help"]).stdout;
     for command in COMMANDS {
-        assert!(overview.contains(&format!("  {command} ")), "{command} is not listed");
+        assert!(
+            overview.contains(&format!("  {command} ")),
+            "{command} is not listed"
+        );
         let help = scratch.done([command, "--help"]).stdout;
         assert!(help.contains("Usage: lapwing") && help.len() > 300, "{help}");
     }
@@ -23,10 +34,22 @@ fn bad_arguments_end_with_status_2() {
     for (args, expected) in [
         (vec!["driv"], "a similar subcommand exists: 'drive'"),
         (vec!["drive", "roduit2007"], "--out <DIR>"),
-        (vec!["drive", "roduit2007", "--out", "o", "--runs", "0"], "0 is not in 1.."),
-        (vec!["drive", "roduit2007", "--out", "o", "--threads", "0"], "0 is not in 1.."),
-        (vec!["sweep", "roduit2007", "--measured", "m", "--out", "o"], "--vary <KEY=V1,V2,...>"),
-        (vec!["world", "segments", "roduit2007", "--max-error", "5mm"], "invalid float literal"),
+        (
+            vec!["drive", "roduit2007", "--out", "o", "--runs", "0"],
+            "0 is not in 1..",
+        ),
+        (
+            vec!["drive", "roduit2007", "--out", "o", "--threads", "0"],
+            "0 is not in 1..",
+        ),
+        (
+            vec!["sweep", "roduit2007", "--measured", "m", "--out", "o"],
+            "--vary <KEY=V1,V2,...>",
+        ),
+        (
+            vec!["world", "segments", "roduit2007", "--max-error", "5mm"],
+            "invalid float literal",
+        ),
         (vec!["compare"], "<DATA>..."),
     ] {
         let ran = scratch.run(&args);
@@ -39,12 +62,34 @@ fn bad_arguments_end_with_status_2() {
 #[test]
 fn json_is_one_document_and_nothing_else() {
     let scratch = Scratch::new();
-    scratch.write("pairs.csv", "d,r\n0,4000\n0.01,1500\n0.02,400\n0.03,230\n0.05,120\n0.07,70\n");
-    scratch.json(["drive", "roduit2007", "--runs", "1", "--laps", "3", "--out", "laps", "--json"]);
+    scratch.write(
+        "pairs.csv",
+        "d,r\n0,4000\n0.01,1500\n0.02,400\n0.03,230\n0.05,120\n0.07,70\n",
+    );
+    scratch.json([
+        "drive",
+        "roduit2007",
+        "--runs",
+        "1",
+        "--laps",
+        "3",
+        "--out",
+        "laps",
+        "--json",
+    ]);
     let [rule_based, laps] = [measured("case_rule_based"), "laps".to_owned()];
     scratch.json(["compare", &rule_based, &laps, "--permutations", "9", "--json"]);
     scratch.json(["fit-sensor", "pairs.csv", "--json"]);
-    let sweep = ["sweep", "roduit2007", "--vary", "slip.level=1", "--measured", &rule_based, "--laps", "3"];
+    let sweep = [
+        "sweep",
+        "roduit2007",
+        "--vary",
+        "slip.level=1",
+        "--measured",
+        &rule_based,
+        "--laps",
+        "3",
+    ];
     let document = scratch.json(sweep.into_iter().chain(["--out", "sweep", "--json"]));
     assert_eq!(document["rows"].as_array().unwrap().len(), 4);
     assert!(matches!(scratch.json(["effects", "--json"]), Value::Array(effects) if !effects.is_empty()));
@@ -54,8 +99,24 @@ fn json_is_one_document_and_nothing_else() {
 fn remarks_go_to_stderr_and_quiet_silences_them() {
     let scratch = Scratch::new();
     // With this sensor the rule-based robot sees walls everywhere and spins for ever.
-    let spinning = ["--set", "sensor.kind=original", "--set", "controller.kind=rule-based", "--set", "run.patience_laps=1"];
-    let drive = ["drive", "roduit2007", "--runs", "1", "--laps", "2", "--out", "laps"];
+    let spinning = [
+        "--set",
+        "sensor.kind=original",
+        "--set",
+        "controller.kind=rule-based",
+        "--set",
+        "run.patience_laps=1",
+    ];
+    let drive = [
+        "drive",
+        "roduit2007",
+        "--runs",
+        "1",
+        "--laps",
+        "2",
+        "--out",
+        "laps",
+    ];
     let ran = scratch.done(drive.into_iter().chain(spinning));
     assert_eq!(ran.stderr, "lapwing: laps/a: 0 of 2 laps (the run timed out)\n");
     assert!(ran.stdout.contains("0 of 2"), "{}", ran.stdout);
@@ -73,28 +134,72 @@ fn a_reader_that_closes_the_pipe_is_no_error() {
         .unwrap();
     drop(child.stdout.take());
     let output = child.wait_with_output().unwrap();
-    assert_eq!((output.status.code(), output.stderr.as_slice()), (Some(0), b"".as_slice()));
+    assert_eq!(
+        (output.status.code(), output.stderr.as_slice()),
+        (Some(0), b"".as_slice())
+    );
 }
 
 #[test]
 fn compare_names_runs_after_their_data_set() {
-    let document = Scratch::new().json(["compare", &measured("case_braitenberg"), "--permutations", "0", "--json"]);
+    let document = Scratch::new().json([
+        "compare",
+        &measured("case_braitenberg"),
+        "--permutations",
+        "0",
+        "--json",
+    ]);
     let clusters = document["clusters"].as_array().unwrap();
-    let names: Vec<_> = clusters.iter().map(|cluster| cluster["name"].as_str().unwrap()).collect();
-    assert_eq!(names, ["a", "b", "c", "d"].map(|run| format!("case_braitenberg/{run}")));
-    assert!(clusters.iter().all(|cluster| cluster["laps"] == 20), "{clusters:?}");
+    let names: Vec<_> = clusters
+        .iter()
+        .map(|cluster| cluster["name"].as_str().unwrap())
+        .collect();
+    assert_eq!(
+        names,
+        ["a", "b", "c", "d"].map(|run| format!("case_braitenberg/{run}"))
+    );
+    assert!(
+        clusters.iter().all(|cluster| cluster["laps"] == 20),
+        "{clusters:?}"
+    );
 }
 
 #[test]
 fn a_drive_is_a_data_set_that_compare_reads() {
     let scratch = Scratch::new();
-    scratch.done(["drive", "roduit2007", "--runs", "27", "--laps", "2", "--log", "--out", "laps"]);
+    scratch.done([
+        "drive",
+        "roduit2007",
+        "--runs",
+        "27",
+        "--laps",
+        "2",
+        "--log",
+        "--out",
+        "laps",
+    ]);
     let document = scratch.json(["compare", "laps", "--permutations", "0", "--json"]);
     let clusters = document["clusters"].as_array().unwrap();
-    assert_eq!((clusters.len(), &clusters[26]["name"]), (27, &Value::from("laps/aa")));
+    assert_eq!(
+        (clusters.len(), &clusters[26]["name"]),
+        (27, &Value::from("laps/aa"))
+    );
     let header = scratch.read("laps/run_a.csv").lines().next().unwrap().to_owned();
-    assert_eq!(header, "t_s,x_m,y_m,ps0,ps1,ps2,ps3,ps4,ps5,ps6,ps7,left_m_s,right_m_s");
-    let again = scratch.done(["drive", "laps/model.toml", "--runs", "27", "--laps", "2", "--log", "--out", "again"]);
+    assert_eq!(
+        header,
+        "t_s,x_m,y_m,ps0,ps1,ps2,ps3,ps4,ps5,ps6,ps7,left_m_s,right_m_s"
+    );
+    let again = scratch.done([
+        "drive",
+        "laps/model.toml",
+        "--runs",
+        "27",
+        "--laps",
+        "2",
+        "--log",
+        "--out",
+        "again",
+    ]);
     assert!(again.stdout.contains("written to again"));
     assert_eq!(scratch.read("again/run_z.csv"), scratch.read("laps/run_z.csv"));
 }

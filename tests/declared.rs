@@ -5,7 +5,8 @@
 //! agree would fail somewhere. The seeds are fixed, so a test that passes goes on passing.
 //!
 //! Laps are the units that are relabelled. One begins where the one before it ends, but the walls make the robot
-//! forget that within a fraction of a lap.
+//! forget that within a fraction of a lap: of 780 pairs of our own data sets 7 were told apart at 1 % by their gate
+//! positions, with either controller.
 //!
 //! A sharper look, at each sensor in each tenth of the lap, finds one difference. A wall's segments depend on its exact
 //! shape the more the farther they lie from its first joint, because each chord ends where the one before it makes it
@@ -66,10 +67,22 @@ impl Run {
 
     /// The laps that are analysed: all of them cross all gates.
     fn laps(&self, gates: &Gates) -> Vec<Lap> {
-        let path: Vec<(f64, Vec2)> = self.t_s.iter().copied().zip(self.position_m.iter().copied()).collect();
-        let laps: Vec<Lap> = track::laps(gates, Way::Forward, &path).into_iter().skip(1).take(LAPS).collect();
+        let path: Vec<(f64, Vec2)> = self
+            .t_s
+            .iter()
+            .copied()
+            .zip(self.position_m.iter().copied())
+            .collect();
+        let laps: Vec<Lap> = track::laps(gates, Way::Forward, &path)
+            .into_iter()
+            .skip(1)
+            .take(LAPS)
+            .collect();
         assert_eq!(laps.len(), LAPS);
-        assert!(laps.iter().all(|lap| lap.missed.is_empty()), "a lap misses a gate");
+        assert!(
+            laps.iter().all(|lap| lap.missed.is_empty()),
+            "a lap misses a gate"
+        );
         laps
     }
 
@@ -78,7 +91,12 @@ impl Run {
         let tenth = lap.times_s.len() / 10;
         let mut rows: Vec<Vec<&[f64; 10]>> = vec![Vec::new(); 10];
         let mut passed = 0;
-        for (t_s, log) in self.t_s.iter().zip(&self.log).filter(|(t, _)| lap.start_s <= **t && **t < lap.end_s) {
+        for (t_s, log) in self
+            .t_s
+            .iter()
+            .zip(&self.log)
+            .filter(|(t, _)| lap.start_s <= **t && **t < lap.end_s)
+        {
             while passed < lap.times_s.len() && lap.times_s[passed] <= *t_s {
                 passed += 1;
             }
@@ -90,28 +108,45 @@ impl Run {
             let square = rows.iter().map(|row| (row[sensor] - mean).powi(2)).sum::<f64>() / (count - 1.0);
             [mean, square.sqrt()]
         };
-        rows.iter().flat_map(|rows| (0..8).flat_map(|sensor| summary(rows, sensor))).collect()
+        rows.iter()
+            .flat_map(|rows| (0..8).flat_map(|sensor| summary(rows, sensor)))
+            .collect()
     }
 }
 
 /// The runs of a data set in a folder, in the order of their names.
 fn runs(folder: &Path) -> Vec<Run> {
     let csv = |path: &std::path::PathBuf| path.file_name().unwrap().to_string_lossy().starts_with("run_");
-    let paths = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).filter(csv);
+    let paths = std::fs::read_dir(folder)
+        .unwrap()
+        .map(|entry| entry.unwrap().path())
+        .filter(csv);
     let mut paths: Vec<_> = paths.collect();
     paths.sort();
     paths.par_iter().map(|path| Run::read(path)).collect()
 }
 
 fn theirs(controller: &str) -> Vec<Run> {
-    runs(Path::new(&format!("{ROOT}/tests/data/declared/{}", controller.replace('-', "_"))))
+    runs(Path::new(&format!(
+        "{ROOT}/tests/data/declared/{}",
+        controller.replace('-', "_")
+    )))
 }
 
 /// Runs of ours, by the program and through its files, as rounded as the others.
 fn ours(controller: &str, count: usize, more: &[&str]) -> Vec<Run> {
     let scratch = Scratch::new();
     let (controller, count) = (format!("controller.kind={controller}"), count.to_string());
-    let drive = ["drive", "roduit2007", "--set", &controller, "--runs", &count, "--out", "ours"];
+    let drive = [
+        "drive",
+        "roduit2007",
+        "--set",
+        &controller,
+        "--runs",
+        &count,
+        "--out",
+        "ours",
+    ];
     scratch.done([drive.as_slice(), more].concat());
     runs(&scratch.path("ours"))
 }
@@ -122,16 +157,24 @@ fn gates() -> Gates {
 }
 
 fn positions(runs: &[Run], gates: &Gates) -> Vec<Vec<f64>> {
-    runs.iter().flat_map(|run| run.laps(gates)).map(|lap| lap.offsets_m).collect()
+    runs.iter()
+        .flat_map(|run| run.laps(gates))
+        .map(|lap| lap.offsets_m)
+        .collect()
 }
 
 fn lap_times(runs: &[Run], gates: &Gates) -> Vec<Vec<f64>> {
-    runs.iter().flat_map(|run| run.laps(gates)).map(|lap| vec![lap.duration_s()]).collect()
+    runs.iter()
+        .flat_map(|run| run.laps(gates))
+        .map(|lap| vec![lap.duration_s()])
+        .collect()
 }
 
 fn readings(runs: &[Run], gates: &Gates) -> Vec<Vec<f64>> {
     let logged = runs.iter().filter(|run| !run.log.is_empty());
-    logged.flat_map(|run| run.laps(gates).into_iter().map(|lap| run.readings(&lap))).collect()
+    logged
+        .flat_map(|run| run.laps(gates).into_iter().map(|lap| run.readings(&lap)))
+        .collect()
 }
 
 /// The p of the energy test, each coordinate divided by its standard deviation over both samples.
@@ -142,13 +185,24 @@ fn energy_p(what: &str, theirs: &[Vec<f64>], ours: &[Vec<f64>]) -> f64 {
         let mean = all().map(|lap| lap[i]).sum::<f64>() / count;
         (all().map(|lap| (lap[i] - mean).powi(2)).sum::<f64>() / count).sqrt()
     };
-    let scale: Vec<f64> = (0..theirs[0].len()).map(|i| deviation(i).max(f64::MIN_POSITIVE)).collect();
+    let scale: Vec<f64> = (0..theirs[0].len())
+        .map(|i| deviation(i).max(f64::MIN_POSITIVE))
+        .collect();
     let scaled = |laps: &[Vec<f64>]| -> Vec<Vec<f64>> {
-        laps.iter().map(|lap| lap.iter().zip(&scale).map(|(x, s)| x / s).collect()).collect()
+        laps.iter()
+            .map(|lap| lap.iter().zip(&scale).map(|(x, s)| x / s).collect())
+            .collect()
     };
-    let [x, y] = [("theirs", theirs), ("ours", ours)].map(|(name, laps)| Cluster::new(name, &scaled(laps)).unwrap());
+    let [x, y] =
+        [("theirs", theirs), ("ours", ours)].map(|(name, laps)| Cluster::new(name, &scaled(laps)).unwrap());
     let test = energy_test(&x, &y, PERMUTATIONS, 1).unwrap();
-    println!("{what}: {} laps of theirs, {} of ours: energy {:.4}, p {:.3}", x.len(), y.len(), test.statistic, test.p);
+    println!(
+        "{what}: {} laps of theirs, {} of ours: energy {:.4}, p {:.3}",
+        x.len(),
+        y.len(),
+        test.statistic,
+        test.p
+    );
     test.p
 }
 
@@ -159,10 +213,17 @@ fn cannot_be_told_apart(controller: &str) {
     let (gates, theirs) = (gates(), theirs(controller));
     assert_eq!(theirs.len(), RUNS);
     let ours = ours(controller, 8, &["--log", "--seed", "1"]);
-    let samples: [(&str, fn(&[Run], &Gates) -> Vec<Vec<f64>>); 3] =
-        [("gate positions", positions), ("lap times", lap_times), ("readings", readings)];
+    let samples: [(&str, fn(&[Run], &Gates) -> Vec<Vec<f64>>); 3] = [
+        ("gate positions", positions),
+        ("lap times", lap_times),
+        ("readings", readings),
+    ];
     for (what, sample) in samples {
-        let p = energy_p(&format!("{controller}, {what}"), &sample(&theirs, &gates), &sample(&ours, &gates));
+        let p = energy_p(
+            &format!("{controller}, {what}"),
+            &sample(&theirs, &gates),
+            &sample(&ours, &gates),
+        );
         assert!(p > LEVEL, "{controller}, {what}: p {p} at a level of {LEVEL}");
     }
 }
@@ -188,8 +249,10 @@ fn mean_laps_agree(controller: &str) {
     let sets: Vec<Cluster> = ours.par_chunks(RUNS).map(cluster).collect();
     let largest = |x: &Cluster, y: &Cluster| max_standardised_difference(x, y).unwrap();
     let observed = largest(&theirs, &sets[0]);
-    let mut null: Vec<f64> =
-        (1..SETS).flat_map(|i| (1..i).map(move |j| (i, j))).map(|(i, j)| largest(&sets[i], &sets[j])).collect();
+    let mut null: Vec<f64> = (1..SETS)
+        .flat_map(|i| (1..i).map(move |j| (i, j)))
+        .map(|(i, j)| largest(&sets[i], &sets[j]))
+        .collect();
     null.sort_by(f64::total_cmp);
     let quantile = null[((1.0 - LEVEL) * null.len() as f64) as usize];
     let median = null[null.len() / 2];
@@ -198,7 +261,10 @@ fn mean_laps_agree(controller: &str) {
          has {median:.2}, one in a hundred more than {quantile:.2}",
         null.len()
     );
-    assert!(observed <= quantile, "{controller}: {observed:.3}, {quantile:.3} allowed");
+    assert!(
+        observed <= quantile,
+        "{controller}: {observed:.3}, {quantile:.3} allowed"
+    );
 }
 
 #[test]
@@ -220,7 +286,10 @@ fn departures(what: &str, theirs: &[Vec<f64>], ours: &[Vec<f64>]) -> Vec<(usize,
     let [x, y] = [("theirs", theirs), ("ours", ours)].map(|(name, laps)| Cluster::new(name, laps).unwrap());
     let z = standardised_differences(&x, &y).unwrap();
     let largest = z.iter().fold(0.0, |largest: f64, z| largest.max(z.abs()));
-    println!("{what}: largest of {} standardised differences {largest:.2}, {LARGEST_OF_160} allowed", z.len());
+    println!(
+        "{what}: largest of {} standardised differences {largest:.2}, {LARGEST_OF_160} allowed",
+        z.len()
+    );
     let large = z.iter().enumerate().filter(|(_, z)| z.abs() > LARGEST_OF_160);
     large.map(|(i, &z)| (i / 16, i % 16 / 2, z)).collect()
 }
@@ -234,12 +303,26 @@ fn readings_depart_only_where_the_walls_do() {
         let exact = readings(&ours(controller, 8, &log), &gates);
         let departing = departures(&format!("{controller}, walls cut at 5 mm"), &theirs, &exact);
         let known = |&(tenth, sensor, _): &(usize, usize, f64)| matches!((tenth, sensor), (3, 1) | (4, 2));
-        assert!(!departing.is_empty() && departing.iter().all(known), "{controller}: {departing:?}");
+        assert!(
+            !departing.is_empty() && departing.iter().all(known),
+            "{controller}: {departing:?}"
+        );
 
-        let alike = readings(&ours(controller, 8, &[log.as_slice(), &["--set", AS_THEIR_WALLS]].concat()), &gates);
+        let alike = readings(
+            &ours(
+                controller,
+                8,
+                &[log.as_slice(), &["--set", AS_THEIR_WALLS]].concat(),
+            ),
+            &gates,
+        );
         let departing = departures(&format!("{controller}, walls as theirs"), &theirs, &alike);
         assert!(departing.is_empty(), "{controller}: {departing:?}");
-        let p = energy_p(&format!("{controller}, walls as theirs, readings"), &theirs, &alike);
+        let p = energy_p(
+            &format!("{controller}, walls as theirs, readings"),
+            &theirs,
+            &alike,
+        );
         assert!(p > LEVEL, "{controller}: p {p} at a level of {LEVEL}");
     }
 }
@@ -249,11 +332,25 @@ fn readings_depart_only_where_the_walls_do() {
 fn a_departure_from_the_model_is_seen() {
     let (gates, theirs) = (gates(), theirs("braitenberg"));
     let slippery = ours("braitenberg", 8, &["--set", "slip.level=0.15"]);
-    let p = energy_p("slip 0.15 for 0.1, gate positions", &positions(&theirs, &gates), &positions(&slippery, &gates));
+    let p = energy_p(
+        "slip 0.15 for 0.1, gate positions",
+        &positions(&theirs, &gates),
+        &positions(&slippery, &gates),
+    );
     assert!(p <= LEVEL, "slip: p {p}");
-    let noise = ["--log", "--set", AS_THEIR_WALLS, "--set", "sensor.improved.noise_fraction=0.06"];
+    let noise = [
+        "--log",
+        "--set",
+        AS_THEIR_WALLS,
+        "--set",
+        "sensor.improved.noise_counts=9",
+    ];
     let noisy = readings(&ours("braitenberg", 8, &noise), &gates);
-    let departing = departures("sensor noise 6 % for 5 %", &readings(&theirs, &gates), &noisy);
+    let departing = departures(
+        "sensor noise of 9 counts for 8",
+        &readings(&theirs, &gates),
+        &noisy,
+    );
     assert!(!departing.is_empty());
 }
 
@@ -291,12 +388,17 @@ fn answers(what: &str, runs: &[Run], controller: fn(f64, f64) -> [f64; 2], slope
         let departure_m_s = |command: [f64; 2]| (command[0] - log[8]).abs().max((command[1] - log[9]).abs());
         // Next to the threshold the rounded readings do not tell on which side of it the others were.
         let near = [-three, 0.0, three];
-        let candidates = near.iter().flat_map(|dr| near.iter().map(move |dl| controller(right + dr, left + dl)));
+        let candidates = near
+            .iter()
+            .flat_map(|dr| near.iter().map(move |dl| controller(right + dr, left + dl)));
         let best_m_s = match slope_m_s_per_count {
             0.0 => candidates.map(departure_m_s).fold(f64::INFINITY, f64::min),
             _ => departure_m_s(controller(right, left)),
         };
-        assert!(best_m_s <= allowed_m_s, "{what}: {log:?} departs by {best_m_s} m/s");
+        assert!(
+            best_m_s <= allowed_m_s,
+            "{what}: {log:?} departs by {best_m_s} m/s"
+        );
         (rows, largest_m_s) = (rows + 1, largest_m_s.max(best_m_s));
     }
     println!("{what}: {rows} commands depart by at most {largest_m_s:.1e} m/s, {allowed_m_s:.1e} allowed");
@@ -307,21 +409,14 @@ fn answers(what: &str, runs: &[Run], controller: fn(f64, f64) -> [f64; 2], slope
 fn commands_are_the_controllers_answer_to_the_readings() {
     let log = ["--log", "--seed", "3"];
     for (name, controller, slope) in [
-        ("braitenberg", braitenberg as fn(f64, f64) -> [f64; 2], SPEED_M_S * GAIN_PER_COUNT),
+        (
+            "braitenberg",
+            braitenberg as fn(f64, f64) -> [f64; 2],
+            SPEED_M_S * GAIN_PER_COUNT,
+        ),
         ("rule-based", rule_based, 0.0),
     ] {
         answers(&format!("theirs, {name}"), &theirs(name), controller, slope);
         answers(&format!("ours, {name}"), &ours(name, 2, &log), controller, slope);
-    }
-}
-
-#[test]
-fn temporary_null() {
-    let gates = gates();
-    for c in ["braitenberg", "rule-based"] {
-        let all = ours(c, 160, &["--seed", "2"]);
-        let sets: Vec<Cluster> = all.par_chunks(4).map(|r| Cluster::new("x", &positions(r, &gates)).unwrap()).collect();
-        let p: Vec<f64> = (0..40usize).flat_map(|i| (0..i).map(move |j| (i, j))).map(|(i, j)| energy_test(&sets[i], &sets[j], 199, 1).unwrap().p).collect();
-        println!("TEMP {c} {} pairs: <=0.01 {} <=0.05 {} <=0.5 {}", p.len(), p.iter().filter(|p| **p <= 0.01).count(), p.iter().filter(|p| **p <= 0.05).count(), p.iter().filter(|p| **p <= 0.5).count());
     }
 }

@@ -9,28 +9,65 @@ fn assert_same(args: &[&str]) {
     let ran = [1, 2].map(|threads| {
         let (folder, threads) = (format!("{threads}/out"), threads.to_string());
         std::fs::create_dir(scratch.path(&threads)).unwrap();
-        let ran = scratch.done(args.iter().chain(&["--threads", &threads, "--quiet", "--out", &folder]));
+        let ran = scratch.done(
+            args.iter()
+                .chain(&["--threads", &threads, "--quiet", "--out", &folder]),
+        );
         (ran.stdout.replace(&folder, "out"), scratch.results(&folder))
     });
     let [(one, one_files), (two, two_files)] = ran;
-    assert_eq!(differing(&one_files, &two_files), Vec::<std::path::PathBuf>::new(), "lapwing {args:?}");
+    assert_eq!(
+        differing(&one_files, &two_files),
+        Vec::<std::path::PathBuf>::new(),
+        "lapwing {args:?}"
+    );
     assert_eq!(one, two, "lapwing {args:?}");
 }
 
 #[test]
 fn drive() {
-    assert_same(&["drive", "roduit2007", "--runs", "4", "--laps", "3", "--seed", "7", "--log"]);
+    assert_same(&[
+        "drive",
+        "roduit2007",
+        "--runs",
+        "4",
+        "--laps",
+        "3",
+        "--seed",
+        "7",
+        "--log",
+    ]);
 }
 
 #[test]
 fn compare() {
-    assert_same(&["compare", &measured("case_braitenberg"), &measured("case_rule_based"), "--permutations", "99"]);
+    assert_same(&[
+        "compare",
+        &measured("case_braitenberg"),
+        &measured("case_rule_based"),
+        "--permutations",
+        "99",
+    ]);
 }
 
 #[test]
 fn sweep() {
-    let vary = ["--vary", "wall.max_error_m=0.001,0.05", "--vary", "controller.kind=braitenberg,rule-based"];
-    let rest = ["--measured", &measured("case_braitenberg"), "--runs", "2", "--laps", "3", "--seeds", "2"];
+    let vary = [
+        "--vary",
+        "wall.max_error_m=0.001,0.05",
+        "--vary",
+        "controller.kind=braitenberg,rule-based",
+    ];
+    let rest = [
+        "--measured",
+        &measured("case_braitenberg"),
+        "--runs",
+        "2",
+        "--laps",
+        "3",
+        "--seeds",
+        "2",
+    ];
     assert_same(&[["sweep", "roduit2007"].as_slice(), &vary, &rest].concat());
 }
 
@@ -45,7 +82,18 @@ fn another_seed_is_another_result() {
     let drive = |seed: &str| {
         let folder = format!("{seed}/out");
         std::fs::create_dir(scratch.path(seed)).unwrap();
-        scratch.done(["drive", "roduit2007", "--runs", "1", "--laps", "1", "--seed", seed, "--out", &folder]);
+        scratch.done([
+            "drive",
+            "roduit2007",
+            "--runs",
+            "1",
+            "--laps",
+            "1",
+            "--seed",
+            seed,
+            "--out",
+            &folder,
+        ]);
         scratch.read(&format!("{folder}/run_a.csv"))
     };
     assert_ne!(drive("1"), drive("2"));

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use crate::support::{LAPWING, Ran, ROOT, Scratch, measured, world_with};
+use crate::support::{LAPWING, ROOT, Ran, Scratch, measured, world_with};
 
 /// The first and the last control point of the outer wall, and the joint of its first two splines.
 const START: &str = "control_points = [[0.55675, 1.02435]";
@@ -42,35 +42,70 @@ fn worlds_that_are_no_course() {
             "world.toml:19: outer wall crosses itself near [1.0659, 1.0331], spline 1 and spline 1; move their control \
              points there apart",
         ),
-        (START, "control_points = [[0.55675, nan]", "world.toml:19: y of control point 1 is NaN, not a finite number"),
-        (START, "control_points = [[-inf, 1.02435]", "world.toml:19: x of control point 1 is -inf, not a finite number"),
-        ("[1.4, 1.2]", "[inf, 1.2]", "world.toml:13: arena = [inf, 1.2] needs a width and a height above 0 m"),
-        ("[1.4, 1.2]", "[1.2, 1.2]", "world.toml:17: outer wall leaves the arena at [1.2024, 0.9680]; move it inside or enlarge the arena"),
+        (
+            START,
+            "control_points = [[0.55675, nan]",
+            "world.toml:19: y of control point 1 is NaN, not a finite number",
+        ),
+        (
+            START,
+            "control_points = [[-inf, 1.02435]",
+            "world.toml:19: x of control point 1 is -inf, not a finite number",
+        ),
+        (
+            "[1.4, 1.2]",
+            "[inf, 1.2]",
+            "world.toml:13: arena = [inf, 1.2] needs a width and a height above 0 m",
+        ),
+        (
+            "[1.4, 1.2]",
+            "[1.2, 1.2]",
+            "world.toml:17: outer wall leaves the arena at [1.2024, 0.9680]; move it inside or enlarge the arena",
+        ),
         (
             "\ndirection",
             "\ndirction",
             "world.toml:14: unknown field `dirction`, expected one of `name`, `arena`, `direction`, `wall`; nearest: \
              `direction`",
         ),
-        ("\"inner\"", "\"middle\"", "world.toml:28: unknown wall `middle`; known: outer, inner"),
+        (
+            "\"inner\"",
+            "\"middle\"",
+            "world.toml:28: unknown wall `middle`; known: outer, inner",
+        ),
         (
             "\"clockwise\"",
             "\"counter-clockwise\"",
             "world.toml:14: outer wall runs clockwise but direction is counter-clockwise; turn the order of its splines \
              and of their points round, or change direction",
         ),
-        ("[1.4, 1.2]", "[1.4, 1.2", "world.toml:14: missing comma between array elements, expected `,`"),
+        (
+            "[1.4, 1.2]",
+            "[1.4, 1.2",
+            "world.toml:14: missing comma between array elements, expected `,`",
+        ),
     ] {
         scratch.write("world.toml", world_with(old, new));
         scratch.refuses(&["world", "check", "world.toml", "--out", "o"], message);
-        scratch.refuses(&["drive", "roduit2007", "--world", "world.toml", "--out", "o"], message);
+        scratch.refuses(
+            &["drive", "roduit2007", "--world", "world.toml", "--out", "o"],
+            message,
+        );
     }
     scratch.refuses(
         &["world", "check", "elsewhere.toml"],
         "unknown world `elsewhere.toml`: there is no file elsewhere.toml; shipped worlds: roduit2007",
     );
     scratch.refuses(
-        &["world", "segments", "roduit2007", "--max-error", "0.001,nan", "--out", "o"],
+        &[
+            "world",
+            "segments",
+            "roduit2007",
+            "--max-error",
+            "0.001,nan",
+            "--out",
+            "o",
+        ],
         "--max-error NaN: maximal error NaN m is outside [1e-9, 10]",
     );
     scratch.refuses(
@@ -89,12 +124,23 @@ fn corridors_too_narrow_for_the_robot() {
         "world.toml: the corridor is 0.0545 m wide at (0.171, 0.103), too narrow for a robot of 0.0740 m; {mend}"
     );
     scratch.refuses(&["world", "check", "world.toml", "--out", "o"], &message);
-    scratch.refuses(&["drive", "roduit2007", "--world", "world.toml", "--out", "o"], &message);
+    scratch.refuses(
+        &["drive", "roduit2007", "--world", "world.toml", "--out", "o"],
+        &message,
+    );
     scratch.write("model.toml", "[robot]\nbody_radius_m = 0.2\n");
-    let message = format!("the corridor is 0.1817 m wide at (0.570, 0.344), too narrow for a robot of 0.4000 m; {mend}");
-    scratch.refuses(&["drive", "model.toml", "--out", "o"], &format!("model.toml:2: {message}"));
+    let message = format!(
+        "the corridor is 0.1817 m wide at (0.570, 0.344), too narrow for a robot of 0.4000 m; {mend}"
+    );
+    scratch.refuses(
+        &["drive", "model.toml", "--out", "o"],
+        &format!("model.toml:2: {message}"),
+    );
     let set = "robot.body_radius_m=0.2";
-    scratch.refuses(&["drive", "roduit2007", "--set", set, "--out", "o"], &format!("--set {set}: {message}"));
+    scratch.refuses(
+        &["drive", "roduit2007", "--set", set, "--out", "o"],
+        &format!("--set {set}: {message}"),
+    );
 }
 
 /// The shipped world with every coordinate of its walls times a factor.
@@ -122,13 +168,34 @@ fn scaled_world(factor: f64) -> String {
 fn models_with_keys_or_values_that_are_not_there() {
     let scratch = Scratch::new();
     for (text, message) in [
-        ("[slip]\n\nlevel = nan\n", "model.toml:3: slip.level = nan is not a finite number"),
-        ("[camera]\nnoise_m = -inf\n", "model.toml:2: camera.noise_m = -inf is not a finite number"),
-        ("[slip]\n\nlevel = 1.4\n", "model.toml:3: slip.level = 1.4 is outside [0, 1]"),
-        ("[controller]\nspeed_m_s = 0\n", "model.toml:2: controller.speed_m_s = 0 is outside [0.0001, 100]"),
-        ("[slip]\nlevle = 0.4\n", "model.toml:2: unknown key `slip.levle`; nearest known: slip.level"),
-        ("# slip\n[slp]\nlevel = 0.4\n", "model.toml:2: unknown key `slp`; nearest known: slip"),
-        ("[slip]\nlevel = \"high\"\n", "model.toml:2: slip.level = \"high\", but a number is needed"),
+        (
+            "[slip]\n\nlevel = nan\n",
+            "model.toml:3: slip.level = nan is not a finite number",
+        ),
+        (
+            "[camera]\nnoise_m = -inf\n",
+            "model.toml:2: camera.noise_m = -inf is not a finite number",
+        ),
+        (
+            "[slip]\n\nlevel = 1.4\n",
+            "model.toml:3: slip.level = 1.4 is outside [0, 1]",
+        ),
+        (
+            "[controller]\nspeed_m_s = 0\n",
+            "model.toml:2: controller.speed_m_s = 0 is outside [0.0001, 100]",
+        ),
+        (
+            "[slip]\nlevle = 0.4\n",
+            "model.toml:2: unknown key `slip.levle`; nearest known: slip.level",
+        ),
+        (
+            "# slip\n[slp]\nlevel = 0.4\n",
+            "model.toml:2: unknown key `slp`; nearest known: slip",
+        ),
+        (
+            "[slip]\nlevel = \"high\"\n",
+            "model.toml:2: slip.level = \"high\", but a number is needed",
+        ),
         (
             "[controller]\nkind = \"rule\"\n",
             "model.toml:2: unknown `controller.kind` = \"rule\"; known: braitenberg, rule-based",
@@ -137,10 +204,22 @@ fn models_with_keys_or_values_that_are_not_there() {
             "[run]\ngates = 3\n",
             "model.toml:2: run.gates = 3: 3 gates are too few: the midline bends too much from one to the next; take more",
         ),
-        ("[sensor]\nmounts = []\n", "model.toml:2: `sensor.mounts` has length 0; 8 is needed"),
-        ("[[effect]]\nkind = \"reading-gian\"\ngain = 1\n", "model.toml:2: effect.0.kind: unknown effect `reading-gian`; nearest known: reading-gain"),
-        ("[[effect]]\nkind = \"reading-gain\"\ngain = inf\n", "model.toml:3: effect.0.gain = inf is not a finite number"),
-        ("world = \"elsewhere\"\n", "model.toml:1: unknown world `elsewhere`: there is no file elsewhere; shipped worlds: roduit2007"),
+        (
+            "[sensor]\nmounts = []\n",
+            "model.toml:2: `sensor.mounts` has length 0; 8 is needed",
+        ),
+        (
+            "[[effect]]\nkind = \"reading-gian\"\ngain = 1\n",
+            "model.toml:2: effect.0.kind: unknown effect `reading-gian`; nearest known: reading-gain",
+        ),
+        (
+            "[[effect]]\nkind = \"reading-gain\"\ngain = inf\n",
+            "model.toml:3: effect.0.gain = inf is not a finite number",
+        ),
+        (
+            "world = \"elsewhere\"\n",
+            "model.toml:1: unknown world `elsewhere`: there is no file elsewhere; shipped worlds: roduit2007",
+        ),
         ("[slip\n", "model.toml:1: unclosed table, expected `]`"),
     ] {
         scratch.write("model.toml", text);
@@ -149,7 +228,10 @@ fn models_with_keys_or_values_that_are_not_there() {
     for (set, message) in [
         ("slip.level=nan", "slip.level = nan is not a finite number"),
         ("slip.level=7", "slip.level = 7 is outside [0, 1]"),
-        ("controller.gian_per_count=1", "unknown key `controller.gian_per_count`; nearest known: controller.gain_per_count"),
+        (
+            "controller.gian_per_count=1",
+            "unknown key `controller.gian_per_count`; nearest known: controller.gain_per_count",
+        ),
         ("slip.level", "a key and a value are needed, as KEY=VALUE"),
     ] {
         let message = format!("--set {set}: {message}");
@@ -161,7 +243,8 @@ fn models_with_keys_or_values_that_are_not_there() {
     );
 }
 
-const DATASET: &str = "name = \"set\"\nworld = \"roduit2007\"\ncontroller = \"braitenberg\"\nruns = [\"a\"]\n";
+const DATASET: &str =
+    "name = \"set\"\nworld = \"roduit2007\"\ncontroller = \"braitenberg\"\nruns = [\"a\"]\n";
 const FINITE: &str = "is not a finite number";
 const NEEDED: &str = "is not a finite number; one is needed here";
 
@@ -169,10 +252,25 @@ const NEEDED: &str = "is not a finite number; one is needed here";
 fn refuses_data_set(scratch: &Scratch, description: &str, run: &str, message: &str) {
     scratch.write("set/dataset.toml", description);
     scratch.write("set/run_a.csv", run);
-    scratch.refuses(&["compare", "set", &measured("case_braitenberg"), "--out", "o"], message);
-    let sweep = ["sweep", "roduit2007", "--vary", "slip.level=1", "--measured", "set", "--out", "o"];
+    scratch.refuses(
+        &["compare", "set", &measured("case_braitenberg"), "--out", "o"],
+        message,
+    );
+    let sweep = [
+        "sweep",
+        "roduit2007",
+        "--vary",
+        "slip.level=1",
+        "--measured",
+        "set",
+        "--out",
+        "o",
+    ];
     scratch.refuses(&sweep, message);
-    scratch.refuses(&["reproduce", "--measured", "set", "--out", "o", "--seeds", "2"], message);
+    scratch.refuses(
+        &["reproduce", "--measured", "set", "--out", "o", "--seeds", "2"],
+        message,
+    );
 }
 
 #[test]
@@ -217,7 +315,10 @@ fn data_sets_that_do_not_say_what_they_are() {
         (with("lasp = 20"), "5: unknown key `lasp`; nearest known: laps"),
         (with("laps = nan"), "5: `laps`: nan is not a whole number from 1"),
         (with("laps = 0"), "5: `laps`: 0 is not a whole number from 1"),
-        (with("[declared]\ncontroller.gain_per_count = inf"), "6: controller.gain_per_count = inf is not a finite number"),
+        (
+            with("[declared]\ncontroller.gain_per_count = inf"),
+            "6: controller.gain_per_count = inf is not a finite number",
+        ),
         (
             with("[declared]\ncontroller.gian_per_count = 1"),
             "6: unknown key `controller.gian_per_count`; nearest known: controller.gain_per_count",
@@ -234,11 +335,22 @@ fn data_sets_that_do_not_say_what_they_are() {
             DATASET.replace("roduit2007", "riduot2007"),
             " `world`: unknown world `riduot2007`: there is no file set/riduot2007; shipped worlds: roduit2007",
         ),
-        (DATASET.replace("world", "wrold"), "2: unknown key `wrold`; nearest known: world"),
-        (DATASET.replace("world = \"roduit2007\"\n", ""), " `world` is missing; add it, a string"),
+        (
+            DATASET.replace("world", "wrold"),
+            "2: unknown key `wrold`; nearest known: world",
+        ),
+        (
+            DATASET.replace("world = \"roduit2007\"\n", ""),
+            " `world` is missing; add it, a string",
+        ),
     ] {
         let run = "t_s,x_m,y_m\n0,1,1\n0.064,1,1\n";
-        refuses_data_set(&scratch, &description, run, &format!("set/dataset.toml:{message}"));
+        refuses_data_set(
+            &scratch,
+            &description,
+            run,
+            &format!("set/dataset.toml:{message}"),
+        );
     }
     scratch.refuses(
         &["compare", "nowhere", &measured("case_braitenberg")],
@@ -253,13 +365,25 @@ fn gate_tables_and_pairs_that_cannot_be_read() {
     for (text, message) in [
         ("a,b\n1,nan\n", format!("bad.csv:2: b: `nan` {NEEDED}")),
         ("a,b\n1,2\n-inf,2\n", format!("bad.csv:3: a: `-inf` {NEEDED}")),
-        ("a,b\n1,2\n1\n", format!("bad.csv:3: 1 fields under a header of 2; {rectangle}")),
-        ("a,b\n1,\n", "bad.csv:2: b: is empty; a number is needed here".to_owned()),
-        ("", "bad.csv is empty; a line with the names of the columns must come first".to_owned()),
+        (
+            "a,b\n1,2\n1\n",
+            format!("bad.csv:3: 1 fields under a header of 2; {rectangle}"),
+        ),
+        (
+            "a,b\n1,\n",
+            "bad.csv:2: b: is empty; a number is needed here".to_owned(),
+        ),
+        (
+            "",
+            "bad.csv is empty; a line with the names of the columns must come first".to_owned(),
+        ),
     ] {
         scratch.write("bad.csv", text);
         scratch.write("good.csv", "a,b\n1,2\n2,2\n0,1\n");
-        scratch.refuses(&["compare", "--sampled", "good.csv", "bad.csv", "--out", "o"], &message);
+        scratch.refuses(
+            &["compare", "--sampled", "good.csv", "bad.csv", "--out", "o"],
+            &message,
+        );
         scratch.refuses(&["fit-sensor", "bad.csv", "--out", "o"], &message);
     }
     scratch.write("bad.csv", "a,b\n0,4000\n-0.01,2000\n");
@@ -295,7 +419,18 @@ fn clusters_with_too_few_laps() {
         &format!("`one` has 1 lap, `other` has 1 lap: 1 modes or gates need at least 2 laps each and 4 together; {mend}"),
     );
     for (name, seed) in [("x", "1"), ("y", "2")] {
-        scratch.done(["drive", "roduit2007", "--runs", "1", "--laps", "1", "--seed", seed, "--out", name]);
+        scratch.done([
+            "drive",
+            "roduit2007",
+            "--runs",
+            "1",
+            "--laps",
+            "1",
+            "--seed",
+            seed,
+            "--out",
+            name,
+        ]);
     }
     scratch.refuses(
         &["compare", "x", "y", "--modes", "1", "--out", "o"],
@@ -307,14 +442,20 @@ fn clusters_with_too_few_laps() {
 /// line over that gap leaves the corridor.
 fn cut(run: &str, laps: impl Fn(usize) -> bool) -> String {
     let gates = std::fs::read_to_string(format!("{ROOT}/worlds/roduit2007/gates.csv")).unwrap();
-    let numbers = |line: &str| line.split(',').map(|field| field.parse::<f64>().unwrap()).collect::<Vec<_>>();
+    let numbers = |line: &str| {
+        line.split(',')
+            .map(|field| field.parse::<f64>().unwrap())
+            .collect::<Vec<_>>()
+    };
     let gates: Vec<Vec<f64>> = gates.lines().skip(1).map(numbers).collect();
     let (mut lap, mut before) = (0, 0);
     let mut kept = String::from("t_s,x_m,y_m\n");
     for line in run.lines().skip(1) {
         let row = numbers(line);
         let squared_m2 = |gate: &Vec<f64>| (gate[1] - row[1]).powi(2) + (gate[2] - row[2]).powi(2);
-        let near = (0..gates.len()).min_by(|&a, &b| squared_m2(&gates[a]).total_cmp(&squared_m2(&gates[b]))).unwrap();
+        let near = (0..gates.len())
+            .min_by(|&a, &b| squared_m2(&gates[a]).total_cmp(&squared_m2(&gates[b])))
+            .unwrap();
         lap += usize::from(near < 10 && before > 90);
         before = near;
         if !laps(lap) || !(15..=35).contains(&near) {
@@ -328,15 +469,32 @@ fn cut(run: &str, laps: impl Fn(usize) -> bool) -> String {
 #[test]
 fn laps_that_skip_a_gate_are_set_aside_and_named() {
     let scratch = Scratch::new();
-    scratch.done(["drive", "roduit2007", "--runs", "2", "--laps", "6", "--seed", "1", "--out", "set"]);
+    scratch.done([
+        "drive",
+        "roduit2007",
+        "--runs",
+        "2",
+        "--laps",
+        "6",
+        "--seed",
+        "1",
+        "--out",
+        "set",
+    ]);
     std::fs::remove_file(scratch.path("set/manifest.json")).unwrap();
     let run = scratch.read("set/run_a.csv");
 
     scratch.write("set/run_a.csv", cut(&run, |lap| lap == 3));
     let ran = scratch.done(["compare", "set", "--permutations", "0", "--json"]);
-    assert_eq!(ran.stderr, "lapwing: set/a: lap 2 misses gate 16 and is set aside\nlapwing: set/a: 5 of 6 laps\n");
+    assert_eq!(
+        ran.stderr,
+        "lapwing: set/a: lap 2 misses gate 16 and is set aside\nlapwing: set/a: 5 of 6 laps\n"
+    );
     let document: serde_json::Value = serde_json::from_str(&ran.stdout).unwrap();
-    assert_eq!((&document["clusters"][0]["laps"], &document["clusters"][1]["laps"]), (&5.into(), &6.into()));
+    assert_eq!(
+        (&document["clusters"][0]["laps"], &document["clusters"][1]["laps"]),
+        (&5.into(), &6.into())
+    );
 
     scratch.write("set/run_a.csv", cut(&run, |lap| (1..7).contains(&lap)));
     let ran = scratch.run(["compare", "set", "--out", "o"]);
@@ -367,7 +525,14 @@ fn folders_that_are_not_ours_or_cannot_be_made() {
     let commands: [&[&str]; 5] = [
         &["drive", "roduit2007"],
         &["compare", &set],
-        &["sweep", "roduit2007", "--vary", "slip.level=1", "--measured", &set],
+        &[
+            "sweep",
+            "roduit2007",
+            "--vary",
+            "slip.level=1",
+            "--measured",
+            &set,
+        ],
         &["world", "check", "roduit2007"],
         &["reproduce", "--seeds", "2"],
     ];
@@ -378,7 +543,10 @@ fn folders_that_are_not_ours_or_cannot_be_made() {
                 "theirs is there and holds no manifest.json of lapwing, so it is not replaced; name another folder with \
                  --out, or move it away",
             ),
-            ("file", "file is there and is not a folder; name another with --out, or move it away"),
+            (
+                "file",
+                "file is there and is not a folder; name another with --out, or move it away",
+            ),
             (
                 "file/o",
                 "cannot create file/o.partial: Not a directory (os error 20); name a folder with --out that can be \
@@ -395,7 +563,18 @@ fn folders_that_are_not_ours_or_cannot_be_made() {
     );
     // An empty folder and an earlier result of ours are replaced.
     for seed in ["1", "2"] {
-        scratch.done(["drive", "roduit2007", "--runs", "1", "--laps", "1", "--seed", seed, "--out", "empty"]);
+        scratch.done([
+            "drive",
+            "roduit2007",
+            "--runs",
+            "1",
+            "--laps",
+            "1",
+            "--seed",
+            seed,
+            "--out",
+            "empty",
+        ]);
     }
     assert!(scratch.read("empty/manifest.json").contains("\"seed\": 2"));
 }
@@ -418,7 +597,10 @@ fn a_disk_that_fills_up() {
     };
     let message = "cannot write disk/o.partial/run_a.csv: No space left on device (os error 28); make room there, or name \
                    another folder with --out";
-    assert_eq!((ran.stderr, ran.stdout), (format!("lapwing: {message}\n"), String::new()));
+    assert_eq!(
+        (ran.stderr, ran.stdout),
+        (format!("lapwing: {message}\n"), String::new())
+    );
 }
 
 /// The same by a limit on the size of a file, which needs no privilege.
@@ -439,10 +621,17 @@ fn a_file_that_may_not_grow() {
             .output();
         let ran = Ran::from(output.unwrap());
         assert_eq!((ran.status, ran.stdout.as_str()), (Some(2), ""), "{}", ran.stderr);
-        assert!(ran.stderr.starts_with("lapwing: cannot write o.partial/"), "{}", ran.stderr);
+        assert!(
+            ran.stderr.starts_with("lapwing: cannot write o.partial/"),
+            "{}",
+            ran.stderr
+        );
         let end = "File too large (os error 27); make room there, or name another folder with --out\n";
         assert!(ran.stderr.ends_with(end), "{}", ran.stderr);
-        assert!(crate::support::files(&scratch.path("")).is_empty(), "{args:?} left something behind");
+        assert!(
+            crate::support::files(&scratch.path("")).is_empty(),
+            "{args:?} left something behind"
+        );
     }
 }
 
@@ -452,7 +641,16 @@ fn a_file_that_may_not_grow() {
 fn an_interrupted_drive_leaves_nothing() {
     let scratch = Scratch::new();
     let mut child = scratch
-        .command(["drive", "roduit2007", "--runs", "100000", "--laps", "20", "--out", "o"])
+        .command([
+            "drive",
+            "roduit2007",
+            "--runs",
+            "100000",
+            "--laps",
+            "20",
+            "--out",
+            "o",
+        ])
         .stdout(std::process::Stdio::piped())
         .stderr(std::process::Stdio::piped())
         .spawn()
@@ -461,7 +659,10 @@ fn an_interrupted_drive_leaves_nothing() {
         assert_eq!(child.try_wait().unwrap(), None);
         std::thread::yield_now();
     }
-    let signal = std::process::Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+    let signal = std::process::Command::new("kill")
+        .args(["-INT", &child.id().to_string()])
+        .status()
+        .unwrap();
     assert!(signal.success());
     let ran = Ran::from(child.wait_with_output().unwrap());
     assert_eq!(ran.stderr, "lapwing: interrupted: nothing was written\n");

@@ -9,7 +9,10 @@ const ACCURACY: f64 = 1e-9;
 
 fn assert_close(name: &str, is: &Value, should: &Value) {
     let (is, should) = (is.as_f64().unwrap(), should.as_f64().unwrap());
-    assert!((is - should).abs() <= ACCURACY * should.abs().max(1.0), "{name}: {is} should be {should}");
+    assert!(
+        (is - should).abs() <= ACCURACY * should.abs().max(1.0),
+        "{name}: {is} should be {should}"
+    );
 }
 
 fn compare(modes: &str) -> Value {
@@ -45,11 +48,18 @@ fn distances_tests_and_the_energy_statistic() {
         let same = |pair: &&Value| pair["a"] == should["a"] && pair["b"] == should["b"];
         let pair = document["pairs"].as_array().unwrap().iter().find(same).unwrap();
         for key in ["distance", "t2", "f", "df1", "df2", "p"] {
-            assert_close(&format!("{key} of {} and {}", should["a"], should["b"]), &pair[key], &should[key]);
+            assert_close(
+                &format!("{key} of {} and {}", should["a"], should["b"]),
+                &pair[key],
+                &should[key],
+            );
         }
         // An absolute bound says nothing of a tiny probability: its logarithm must agree too.
         let [is, should] = [&pair["p"], &should["p"]].map(|p| p.as_f64().unwrap().ln());
-        assert!((is - should).abs() < ACCURACY * should.abs(), "ln p {is} should be {should}");
+        assert!(
+            (is - should).abs() < ACCURACY * should.abs(),
+            "ln p {is} should be {should}"
+        );
     }
     for should in expected["energy"].as_array().into_iter().flatten() {
         let same = |pair: &&Value| pair["a"] == should["a"] && pair["b"] == should["b"];

@@ -86,15 +86,25 @@ impl Scratch {
         let before = files(self.0.path());
         let ran = self.run(args);
         assert_eq!(ran.stderr, format!("lapwing: {message}\n"), "lapwing {args:?}");
-        assert_eq!((ran.status, ran.stdout.as_str()), (Some(2), ""), "lapwing {args:?}");
+        assert_eq!(
+            (ran.status, ran.stdout.as_str()),
+            (Some(2), ""),
+            "lapwing {args:?}"
+        );
         let after = files(self.0.path());
-        assert!(before == after, "lapwing {args:?} changed {:?} to {:?}", before.keys(), after.keys());
+        assert!(
+            before == after,
+            "lapwing {args:?} changed {:?} to {:?}",
+            before.keys(),
+            after.keys()
+        );
     }
 
     /// The files in a folder of this one and their bytes, but for those that may differ from run to run.
     pub(crate) fn results(&self, folder: &str) -> BTreeMap<PathBuf, Vec<u8>> {
         let mut results = files(&self.path(folder));
-        let varies = |path: &Path| path.ends_with("manifest.json") || path.to_string_lossy().contains("timing");
+        let varies =
+            |path: &Path| path.ends_with("manifest.json") || path.to_string_lossy().contains("timing");
         results.retain(|path, _| !varies(path));
         assert!(!results.is_empty(), "{folder} is empty");
         results
@@ -122,7 +132,11 @@ pub(crate) fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
 
 /// The files that differ between two folders.
 pub(crate) fn differing(a: &BTreeMap<PathBuf, Vec<u8>>, b: &BTreeMap<PathBuf, Vec<u8>>) -> Vec<PathBuf> {
-    a.keys().chain(b.keys()).filter(|path| a.get(*path) != b.get(*path)).cloned().collect()
+    a.keys()
+        .chain(b.keys())
+        .filter(|path| a.get(*path) != b.get(*path))
+        .cloned()
+        .collect()
 }
 
 /// The path of a file of the repository.

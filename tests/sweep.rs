@@ -10,18 +10,44 @@ fn rows(scratch: &Scratch, folder: &str) -> (String, Vec<Vec<String>>) {
     let text = scratch.read(&format!("{folder}/sweep.csv"));
     let mut lines = text.lines();
     let header = lines.next().unwrap().to_owned();
-    (header, lines.map(|line| line.split(',').map(str::to_owned).collect()).collect())
+    (
+        header,
+        lines
+            .map(|line| line.split(',').map(str::to_owned).collect())
+            .collect(),
+    )
 }
 
 #[test]
 fn there_is_a_row_for_each_point_seed_and_run() {
     let scratch = Scratch::new();
-    let vary = ["--vary", "slip.level=0.1,1", "--vary", "wall.max_error_m=0.005,0.01"];
+    let vary = [
+        "--vary",
+        "slip.level=0.1,1",
+        "--vary",
+        "wall.max_error_m=0.005,0.01",
+    ];
     let set = measured("case_braitenberg");
-    let rest = ["--measured", &set, "--laps", "4", "--runs", "2", "--seeds", "3", "--seed", "5", "--out", "o"];
+    let rest = [
+        "--measured",
+        &set,
+        "--laps",
+        "4",
+        "--runs",
+        "2",
+        "--seeds",
+        "3",
+        "--seed",
+        "5",
+        "--out",
+        "o",
+    ];
     scratch.done([["sweep", "roduit2007"].as_slice(), &vary, &rest].concat());
     let (header, rows) = rows(&scratch, "o");
-    assert_eq!(header, "slip.level,wall.max_error_m,seed,run,distance,t2,p,laps,timed_out");
+    assert_eq!(
+        header,
+        "slip.level,wall.max_error_m,seed,run,distance,t2,p,laps,timed_out"
+    );
     assert_eq!(rows.len(), 3 * 4 * 4);
     let distinct: BTreeSet<_> = rows.iter().map(|row| row[..4].to_vec()).collect();
     assert_eq!(distinct.len(), rows.len());
@@ -29,7 +55,10 @@ fn there_is_a_row_for_each_point_seed_and_run() {
     for row in &rows {
         let [distance, t2, p]: [f64; 3] = std::array::from_fn(|i| row[4 + i].parse().unwrap());
         // Eq. 9 with 8 simulated and 20 measured laps.
-        assert!((t2 - 8.0 * 20.0 / 28.0 * distance * distance).abs() < 1e-9 * t2, "{row:?}");
+        assert!(
+            (t2 - 8.0 * 20.0 / 28.0 * distance * distance).abs() < 1e-9 * t2,
+            "{row:?}"
+        );
         assert!(p > 0.0 && p <= 1.0, "{row:?}");
         assert_eq!(row[7..], ["8", "0"]);
     }
@@ -43,7 +72,10 @@ fn there_is_a_row_for_each_point_seed_and_run() {
         .collect();
     let mean = of_c.iter().sum::<f64>() / 3.0;
     let is = point["against"][2]["distance"].as_f64().unwrap();
-    assert!((is - mean).abs() < 1e-12, "{is} should be the mean {mean} of {of_c:?}");
+    assert!(
+        (is - mean).abs() < 1e-12,
+        "{is} should be the mean {mean} of {of_c:?}"
+    );
     for name in ["o/distance.svg", "o/modes.svg"] {
         assert!(scratch.read(name).starts_with("<svg "), "{name}");
     }
@@ -55,15 +87,48 @@ fn a_point_is_simulated_as_if_it_stood_alone() {
     let scratch = Scratch::new();
     let set = measured("case_braitenberg");
     let sweep = |vary: &str, out: &str| {
-        scratch.done(["sweep", "roduit2007", "--vary", vary, "--measured", &set, "--laps", "3", "--out", out]);
+        scratch.done([
+            "sweep",
+            "roduit2007",
+            "--vary",
+            vary,
+            "--measured",
+            &set,
+            "--laps",
+            "3",
+            "--out",
+            out,
+        ]);
     };
     sweep("slip.level=1", "alone");
-    scratch.done(["drive", "roduit2007", "--set", "slip.level=1", "--runs", "1", "--laps", "3", "--out", "drive"]);
+    scratch.done([
+        "drive",
+        "roduit2007",
+        "--set",
+        "slip.level=1",
+        "--runs",
+        "1",
+        "--laps",
+        "3",
+        "--out",
+        "drive",
+    ]);
     let pairs = scratch.json(["compare", &set, "drive", "--permutations", "0", "--json"])["pairs"].clone();
-    let with_run_a = pairs.as_array().unwrap().iter().find(|pair| pair["b"] == "drive/a").unwrap();
-    let (is, should) = (&rows(&scratch, "alone").1[0][3], with_run_a["distance"].as_f64().unwrap());
+    let with_run_a = pairs
+        .as_array()
+        .unwrap()
+        .iter()
+        .find(|pair| pair["b"] == "drive/a")
+        .unwrap();
+    let (is, should) = (
+        &rows(&scratch, "alone").1[0][3],
+        with_run_a["distance"].as_f64().unwrap(),
+    );
     // The data set on disk is rounded to 0.1 mm.
-    assert!((is.parse::<f64>().unwrap() - should).abs() < 0.05 * should, "{is} should be {should}");
+    assert!(
+        (is.parse::<f64>().unwrap() - should).abs() < 0.05 * should,
+        "{is} should be {should}"
+    );
 }
 
 #[test]
@@ -72,14 +137,29 @@ fn a_point_whose_runs_time_out_has_no_distance() {
     let vary = ["--vary", "controller.kind=braitenberg,rule-based"];
     let set = measured("case_braitenberg");
     // With this sensor the rule-based robot sees walls everywhere and spins for ever.
-    let rest = ["--set", "sensor.kind=original", "--measured", &set, "--runs", "2", "--laps", "3", "--out", "o"];
+    let rest = [
+        "--set",
+        "sensor.kind=original",
+        "--measured",
+        &set,
+        "--runs",
+        "2",
+        "--laps",
+        "3",
+        "--out",
+        "o",
+    ];
     let ran = scratch.done([["sweep", "roduit2007"].as_slice(), &vary, &rest].concat());
-    let remark = |run| format!("lapwing: seed 1: controller.kind=rule-based/{run}: 0 of 3 laps (the run timed out)\n");
+    let remark =
+        |run| format!("lapwing: seed 1: controller.kind=rule-based/{run}: 0 of 3 laps (the run timed out)\n");
     assert_eq!(ran.stderr, remark("a") + &remark("b"));
     let (_, rows) = rows(&scratch, "o");
     assert_eq!(rows.len(), 8);
     for row in &rows[..4] {
-        assert!(row[3].parse::<f64>().unwrap() > 0.0 && row[6..] == ["6", "0"], "{row:?}");
+        assert!(
+            row[3].parse::<f64>().unwrap() > 0.0 && row[6..] == ["6", "0"],
+            "{row:?}"
+        );
     }
     for row in &rows[4..] {
         assert_eq!(row[3..], ["", "", "", "0", "2"], "{row:?}");
@@ -90,8 +170,21 @@ fn a_point_whose_runs_time_out_has_no_distance() {
 fn long_sweep(scratch: &Scratch, rest: &[&str]) -> Vec<String> {
     scratch.write("measured.txt", measured("case_braitenberg"));
     let set = measured("case_braitenberg");
-    let sweep = ["sweep", "roduit2007", "--vary", "slip.level=0,0.1,0.3,1", "--measured", &set, "--laps", "10"];
-    [sweep.as_slice(), &["--seeds", "30", "--quiet"], rest].concat().into_iter().map(str::to_owned).collect()
+    let sweep = [
+        "sweep",
+        "roduit2007",
+        "--vary",
+        "slip.level=0,0.1,0.3,1",
+        "--measured",
+        &set,
+        "--laps",
+        "10",
+    ];
+    [sweep.as_slice(), &["--seeds", "30", "--quiet"], rest]
+        .concat()
+        .into_iter()
+        .map(str::to_owned)
+        .collect()
 }
 
 #[cfg(unix)]
@@ -103,7 +196,10 @@ fn an_interrupted_sweep_goes_on_to_the_same_bytes() {
     for attempt in 0..2 {
         let resume = (attempt > 0).then_some("--resume");
         let ran = interrupted(&scratch, args.iter().map(String::as_str).chain(resume));
-        assert_eq!(ran.stderr, "lapwing: interrupted: run again with --resume to go on\n");
+        assert_eq!(
+            ran.stderr,
+            "lapwing: interrupted: run again with --resume to go on\n"
+        );
         assert_eq!((ran.status, ran.stdout.as_str()), (Some(2), ""));
         assert!(!scratch.path("stopped").exists());
         let now = files(&scratch.path("stopped.partial/units")).len();
@@ -133,11 +229,19 @@ fn an_interrupted_sweep_goes_on_to_the_same_bytes() {
 fn interrupted<'a>(scratch: &Scratch, args: impl Iterator<Item = &'a str>) -> Ran {
     let units = || std::fs::read_dir(scratch.path("stopped.partial/units")).map_or(0, Iterator::count);
     let (before, begun) = (units(), Instant::now());
-    let child = scratch.command(args).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    let child = scratch
+        .command(args)
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
     while units() < before + 3 && begun.elapsed() < Duration::from_secs(60) {
         std::thread::yield_now();
     }
-    let signal = std::process::Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+    let signal = std::process::Command::new("kill")
+        .args(["-INT", &child.id().to_string()])
+        .status()
+        .unwrap();
     assert!(signal.success());
     child.wait_with_output().unwrap().into()
 }
@@ -150,9 +254,21 @@ fn what_cannot_be_swept_is_refused() {
     scratch.write("other/world.toml", narrow);
     scratch.write("model.toml", "[slip]\nlevel = 0.1\n\n[camera]\nnoise_m = 0\n");
     for (vary, rest, message) in [
-        ("slip.levl=1", "", "--vary slip.levl=1: unknown key `slip.levl`; nearest known: slip.level"),
-        ("slip.level=0,1.5", "", "--vary slip.level=1.5: slip.level = 1.5 is outside [0, 1]"),
-        ("slip.level=nan", "", "--vary slip.level=nan: slip.level = nan is not a finite number"),
+        (
+            "slip.levl=1",
+            "",
+            "--vary slip.levl=1: unknown key `slip.levl`; nearest known: slip.level",
+        ),
+        (
+            "slip.level=0,1.5",
+            "",
+            "--vary slip.level=1.5: slip.level = 1.5 is outside [0, 1]",
+        ),
+        (
+            "slip.level=nan",
+            "",
+            "--vary slip.level=nan: slip.level = nan is not a finite number",
+        ),
         (
             "robot.body_radius_m=0.03,0.3",
             "",
@@ -168,7 +284,16 @@ fn what_cannot_be_swept_is_refused() {
             ),
         ),
     ] {
-        let mut args = vec!["sweep", "model.toml", "--vary", vary, "--measured", &set, "--out", "o"];
+        let mut args = vec![
+            "sweep",
+            "model.toml",
+            "--vary",
+            vary,
+            "--measured",
+            &set,
+            "--out",
+            "o",
+        ];
         if !rest.is_empty() {
             args.extend(["--set", rest]);
         }

@@ -12,13 +12,23 @@ fn the_circuit_needs_the_papers_numbers_of_segments() {
     let document = Scratch::new().json(["world", "segments", &world, "--max-error", errors, "--json"]);
     assert_eq!(document["world"], "roduit2007");
     let rows = document["approximations"].as_array().unwrap();
-    let counts = |key: &str| rows.iter().map(|row| row["per_wall"][key].as_u64().unwrap()).collect::<Vec<_>>();
-    assert_eq!(json!(rows.iter().map(|row| &row["segments"]).collect::<Vec<_>>()), json!([105, 47, 33, 15]));
+    let counts = |key: &str| {
+        rows.iter()
+            .map(|row| row["per_wall"][key].as_u64().unwrap())
+            .collect::<Vec<_>>()
+    };
+    assert_eq!(
+        json!(rows.iter().map(|row| &row["segments"]).collect::<Vec<_>>()),
+        json!([105, 47, 33, 15])
+    );
     assert_eq!(counts("outer"), [61, 27, 20, 9]);
     assert_eq!(counts("inner"), [44, 20, 13, 6]);
     for row in rows {
         let [bound, error] = ["max_error_m", "measured_error_m"].map(|key| row[key].as_f64().unwrap());
-        assert!(error <= bound && error > 0.5 * bound, "{error} m for at most {bound} m");
+        assert!(
+            error <= bound && error > 0.5 * bound,
+            "{error} m for at most {bound} m"
+        );
     }
 }
 
@@ -37,7 +47,15 @@ fn a_shipped_world_goes_by_its_name_and_is_sound() {
 fn pictures_are_written_where_they_are_asked_for() {
     let scratch = Scratch::new();
     scratch.done(["world", "check", "roduit2007", "--out", "course"]);
-    scratch.done(["world", "segments", "roduit2007", "--max-error", "0.005", "--out", "segments"]);
+    scratch.done([
+        "world",
+        "segments",
+        "roduit2007",
+        "--max-error",
+        "0.005",
+        "--out",
+        "segments",
+    ]);
     for name in ["course/course.svg", "segments/segments.svg"] {
         assert!(scratch.read(name).starts_with("<svg "), "{name}");
     }

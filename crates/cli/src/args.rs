@@ -50,6 +50,9 @@ pub(crate) enum Command {
     FitSensor(FitSensor),
     /// Trace what the model lacks in measured laps, add it, and tell the error before and after
     Trace(Trace),
+    /// Measure what the program itself costs
+    #[command(subcommand)]
+    Bench(Bench),
     /// List the effects that the simulator knows beyond the declared model
     Effects(Effects),
 }
@@ -273,4 +276,27 @@ pub(crate) struct Trace {
     /// Print trace.json
     #[arg(long)]
     pub(crate) json: bool,
+}
+
+/// What can be measured.
+#[derive(Debug, Subcommand)]
+pub(crate) enum Bench {
+    /// Ray casting: cost against the number of segments, and faithfulness against cost
+    ///
+    /// Eight rays at the poses of a driven lap, by a plain loop, the BVH of parry2d and lapwing's own casters. Leave the
+    /// machine alone while it measures.
+    Rays {
+        /// Numbers of segments; the circuit is cut as finely as they need
+        #[arg(long, value_delimiter = ',', default_value = "15,33,47,105,1000,10000,100000", value_name = "N,...")]
+        segments: Vec<usize>,
+        /// Draws behind every interval of faithfulness
+        #[arg(long, default_value_t = 20, value_name = "N", value_parser = clap::value_parser!(u32).range(2..))]
+        seeds: u32,
+        /// Print one JSON document
+        #[arg(long)]
+        json: bool,
+        /// Folder for tables and pictures
+        #[arg(long, value_name = "DIR")]
+        out: Option<PathBuf>,
+    },
 }

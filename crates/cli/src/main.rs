@@ -12,6 +12,7 @@ mod interrupt;
 mod laps;
 mod output;
 mod progress;
+mod ray_study;
 mod report;
 mod session;
 mod setup;
@@ -52,6 +53,7 @@ fn run(cli: Cli) -> Result<()> {
         Command::World(args) => commands::world::run(&session, &args),
         Command::FitSensor(args) => commands::fit_sensor::run(&session, &args),
         Command::Trace(args) => commands::trace::run(&session, &args),
+        Command::Bench(args) => commands::bench::run(&session, &args),
         Command::Effects(args) => commands::effects::run(&session, &args),
     }
 }

@@ -99,18 +99,18 @@ fn main() -> Result<()> {
         ["a", "b", "c", "d"].iter().map(|r| read(&std::path::Path::new(&args[2]).join(format!("run_{r}.csv.gz")))).collect::<Result<_>>()?
     };
     let t = std::time::Instant::now();
-    if args.iter().any(|_| std::env::var("SEARCH").is_ok()) {
-        for (n, g) in diagnose::debug_search(&model, &scene, &runs) {
-            println!("{g:10.1}  {n}");
-        }
-        println!("took {:?}", t.elapsed());
-        return Ok(());
+    let refs: Vec<&[LogRow]> = runs.iter().map(Vec::as_slice).collect();
+    let d = diagnose::diagnose_logs(&model, &scene, &refs)?;
+    println!("took {:?} {:?} p {:.2e} corners {:?} rem {:.4} {:.2e}", t.elapsed(), d.verdict, d.p, d.corners, d.remainder_share, d.remainder_p);
+    println!("decide {:?}", d.decide);
+    println!("unlisted {:?}", d.unlisted);
+    for e in d.explanations.iter().take(6) {
+        let text: Vec<String> = e.effects.iter().map(|c| format!("{} {:?} +- {:?}", c.setting.spec.name, c.setting.pattern, c.standard_errors)).collect();
+        println!("{:10.1}  {}", e.score(), text.join(" & "));
     }
-    let mut scores = diagnose::debug_screen(&model, &scene, &runs);
-    println!("took {:?}", t.elapsed());
-    scores.sort_by(|a, b| b.1.total_cmp(&a.1));
-    for (n, g, v) in scores.iter().take(18) {
-        println!("{g:10.1}  {n} -> {v:?}");
+    for c in d.channels {
+        print!("{:.2}/{:.2}/{:.3} ", c.mean_square, c.kurtosis, c.correlation);
     }
+    println!();
     Ok(())
 }

@@ -32,4 +32,10 @@ pub enum Error {
     /// A robot that crashes or stops with the effects found.
     #[error("with the effects found the simulated robot does not complete its laps")]
     Crash,
+    /// Logs that cannot be followed.
+    #[error("no stretch of 200 control steps with commands and camera positions can be followed: at least one run needs one")]
+    NoLog,
+    /// What the simulator says of the model.
+    #[error(transparent)]
+    Simulation(#[from] sim::Error),
 }

@@ -78,7 +78,7 @@ impl Model {
     pub fn check(&self) -> Result<(), Error> {
         let Machine { robot, response, noise, controller, .. } = &self.machine;
         let positive = f64::MIN_POSITIVE;
-        check("wall.max_error_m", self.wall.max_error_m, 1e-6, 1.0)?;
+        check("wall.max_error_m", self.wall.max_error_m, 1e-9, 1.0)?;
         check("wall.thickness_m", self.wall.thickness_m, 0.0, 0.1)?;
         check("robot.body_radius_m", robot.body_radius_m, positive, 10.0)?;
         check("robot.axle_m", robot.axle_m, 1e-6, 10.0)?;

@@ -75,7 +75,12 @@ impl Sweep {
         let circuit = setup::model_circuit(&file, &world)?;
         let set = measured_set(args, &world)?;
         remark_on_declared(session, &set, &file.config)?;
-        let base = Base { file: &file, world: &world, circuit: &circuit, runs: args.runs as usize };
+        let base = Base {
+            file: &file,
+            world: &world,
+            circuit: &circuit,
+            runs: args.runs as usize,
+        };
         let grid = Grid::new(&base, &args.vary)?;
         let measured = Measured::on(set, circuit)?;
         measured

@@ -14,6 +14,8 @@ mod study;
 mod table_ii;
 mod table_iii;
 
+pub(crate) use comparison::Comparison;
+pub(crate) use estimate::Estimate;
 pub(crate) use outcome::{Block, Claim, Outcome, Picture, Section};
 pub(crate) use study::{Measurements, Study};
 

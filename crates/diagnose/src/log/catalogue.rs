@@ -3,7 +3,7 @@
 
 use std::f64::consts::TAU;
 
-use sim::{EFFECTS, Setting, Spec};
+use sim::{EFFECTS, Pattern, Setting, Spec, Stage, UNLISTED};
 
 /// How the multiples of a variant's columns become values.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -162,4 +162,58 @@ fn places(wall_lengths_m: [f64; 2], spacing_m: f64) -> impl Iterator<Item = (f64
         let count = (length_m / spacing_m).ceil() as usize;
         (0..count).map(move |i| (wall as f64, i as f64 / count as f64))
     })
+}
+
+/// The stage in which a setting shows: that of its effect, or of what an effect without a name acts on.
+pub(crate) fn stage_of(setting: &Setting) -> Stage {
+    if *setting.spec != UNLISTED {
+        return setting.spec.stage;
+    }
+    let acts_on = match &setting.pattern {
+        Pattern::Constant(values) => values[0],
+        Pattern::ByTime { start, .. } => start[0],
+        Pattern::ByRun(runs) => runs[0][0],
+    };
+    match UNLISTED.params[0].choices.get(acts_on as usize) {
+        Some(&("reading" | "left-right difference")) => Stage::Sense,
+        Some(&("camera x" | "camera y")) => Stage::Observe,
+        _ => Stage::Act,
+    }
+}
+
+/// Groups of basis functions for an effect without a name: every target with every dependence.
+pub(crate) fn unlisted_variants() -> Vec<Variant> {
+    let [targets, dependences, bases] = [0, 1, 2].map(|i| UNLISTED.params[i].choices);
+    let number = |names: &[&str], name: &str| names.iter().position(|n| *n == name).map(|i| i as f64);
+    let harmonics = number(bases, "harmonics").unwrap_or(1.0);
+    let mut groups = Vec::new();
+    for target in 0..targets.len() {
+        // The step of a coefficient: about a percent, a millimetre, a count or a hundredth of a radian per second.
+        let step = match targets[target] {
+            "side slip" | "camera x" | "camera y" => 5e-4,
+            "left-right difference" => 1.0,
+            _ => 0.01,
+        };
+        for (name, basis, count, scale) in [
+            ("constant", 0.0, 1, 1.0),
+            ("heading", harmonics, 4, 1.0),
+            ("place", 0.0, 15, 4.0),
+            ("speed", 0.0, 3, 20.0),
+            ("turn", 0.0, 4, 20.0),
+            ("time", 0.0, 3, 1.0 / 200.0),
+        ] {
+            let Some(dependence) = number(dependences, name) else { continue };
+            let mut values = vec![target as f64, dependence, basis];
+            values.extend(std::iter::repeat_n(0.0, count));
+            let free: Vec<usize> = (3..3 + count).collect();
+            let degree = |i: usize| match name {
+                "place" => (1..).take_while(|d| d * (d + 1) / 2 <= i).count(),
+                "heading" => 0,
+                _ => i,
+            };
+            let steps = (0..count).map(|i| step * f64::powi(scale, degree(i) as i32)).collect();
+            groups.push(Variant { spec: &UNLISTED, shape: Shape::Linear, values, sizes: free.clone(), free, steps });
+        }
+    }
+    groups
 }

@@ -20,7 +20,7 @@ pub(crate) fn column(forecast: &mut Forecast<'_>, stage: Stage, trace: &Trace) -
         if matches!(stage, Stage::Sense | Stage::World) {
             let read = forecast.readings_beside(instant.sensed_from, &instant.covariance, &instant.look);
             for lane in (0..8).filter(|&lane| read[lane] != instant.uncut[lane]) {
-                shift[lane + 2] = cut(read[lane], instant.deviation[lane]).mean - instant.expected[lane];
+                shift[lane + 2] = cut(read[lane], instant.deviation[lane], trace.step_counts).mean - instant.expected[lane];
             }
         }
         for m in 0..MEASURED {

@@ -3,13 +3,14 @@
 use rayon::prelude::*;
 use sim::{Forecast, Model, Pattern, Scene, Setting, World};
 
+use super::catalogue::stage_of;
 use super::columns::column;
 use super::filter::{Trace, Used, clear_readings, filter};
 use super::rows::{LogRow, stretches};
 use super::screen::{Normal, normal_of};
 
 /// A stretch of one run's log and what of it counts.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(crate) struct Stretch<'a> {
     pub(crate) run: usize,
     pub(crate) rows: &'a [LogRow],
@@ -22,6 +23,8 @@ pub(crate) struct Evidence<'a> {
     pub(crate) scene: &'a Scene,
     pub(crate) model: &'a Model,
     pub(crate) stretches: Vec<Stretch<'a>>,
+    /// Step that the readings are rounded to, counts; 0 for none.
+    pub(crate) step_counts: f64,
 }
 
 /// One value that is fitted: which setting, which of its values, and the step of its derivative.
@@ -48,10 +51,10 @@ impl Knob {
     /// The settings with the value changed by a multiple of the step, kept inside its range.
     pub(crate) fn turned(&self, settings: &[Setting], multiple: f64) -> Vec<Setting> {
         let mut turned = settings.to_vec();
-        let param = &settings[self.setting].spec.params[self.value];
+        let param = settings[self.setting].spec.params.get(self.value);
         let value = self.of(&mut turned);
         *value += multiple * self.step;
-        if !self.slope {
+        if let (false, Some(param)) = (self.slope, param) {
             *value = value.clamp(param.low, param.high);
         }
         turned
@@ -76,7 +79,12 @@ impl Assessment {
 impl<'a> Evidence<'a> {
     /// Prepares the runs: the declared model's poses decide which readings count. Without a stretch that can be
     /// filtered there is no evidence.
-    pub(crate) fn new(scene: &'a Scene, model: &'a Model, runs: &'a [&'a [LogRow]]) -> Result<Self, sim::Error> {
+    pub(crate) fn new(
+        scene: &'a Scene,
+        model: &'a Model,
+        runs: &[&'a [LogRow]],
+        step_counts: f64,
+    ) -> Result<Self, sim::Error> {
         let pieces: Vec<(usize, &[LogRow])> = (runs.iter().enumerate())
             .flat_map(|(run, rows)| stretches(rows, &model.run).into_iter().map(move |piece| (run, piece)))
             .collect();
@@ -84,11 +92,11 @@ impl<'a> Evidence<'a> {
             .into_par_iter()
             .map(|(run, rows)| {
                 let world = scene.world(model, run)?;
-                let first = filter(&world, rows, None);
+                let first = filter(&world, rows, None, step_counts);
                 Ok(first.map(|trace| Stretch { run, rows, used: clear_readings(&world, &trace, rows) }))
             })
             .collect::<Result<Vec<_>, sim::Error>>()?;
-        Ok(Self { scene, model, stretches: stretches.into_iter().flatten().collect() })
+        Ok(Self { scene, model, stretches: stretches.into_iter().flatten().collect(), step_counts })
     }
 
     /// The runs that gave evidence, in rising order.
@@ -103,7 +111,21 @@ impl<'a> Evidence<'a> {
         let stretches = (self.stretches.iter().filter(|stretch| stretch.run == run))
             .map(|stretch| Stretch { run, rows: stretch.rows, used: stretch.used.clone() })
             .collect();
-        Self { scene: self.scene, model: self.model, stretches }
+        Self { stretches, ..*self }
+    }
+
+    /// The same evidence against a scene whose walls are cut otherwise.
+    pub(crate) fn elsewhere<'b>(&self, scene: &'b Scene) -> Evidence<'b>
+    where
+        'a: 'b,
+    {
+        let stretches = self.stretches.iter().map(Stretch::clone).collect();
+        Evidence { scene, model: self.model, stretches, step_counts: self.step_counts }
+    }
+
+    /// The log-likelihood with these effects added.
+    pub(crate) fn likelihood(&self, settings: &[Setting]) -> Option<f64> {
+        self.assess(settings, &[]).map(|found| found.total())
     }
 
     pub(crate) fn world(&self, settings: &[Setting], run: usize) -> Result<World<'a>, sim::Error> {
@@ -118,7 +140,7 @@ impl<'a> Evidence<'a> {
             .par_iter()
             .map(|stretch| {
                 let world = self.world(settings, stretch.run).ok()?;
-                let trace = filter(&world, stretch.rows, Some(&stretch.used))?;
+                let trace = filter(&world, stretch.rows, Some(&stretch.used), self.step_counts)?;
                 Some((world, trace))
             })
             .collect()
@@ -131,7 +153,7 @@ impl<'a> Evidence<'a> {
             .par_iter()
             .map(|stretch| {
                 let world = self.world(settings, stretch.run).ok()?;
-                let trace = filter(&world, stretch.rows, Some(&stretch.used))?;
+                let trace = filter(&world, stretch.rows, Some(&stretch.used), self.step_counts)?;
                 let columns = knobs
                     .par_iter()
                     .map(|knob| self.derivative(&world, &trace, settings, knob))
@@ -154,7 +176,7 @@ impl<'a> Evidence<'a> {
         }
         let other = self.world(&turned, run).ok()?;
         let mut forecast = Forecast::compared(&other, world).ok()?;
-        let mut change = column(&mut forecast, settings[knob.setting].spec.stage, trace);
+        let mut change = column(&mut forecast, stage_of(&settings[knob.setting]), trace);
         change.iter_mut().for_each(|c| *c *= sign);
         Some(change)
     }

@@ -48,6 +48,8 @@ pub(crate) struct Trace {
     /// Sum over the used numbers of -(innovation^2 + log variance) / 2.
     pub(crate) log_likelihood: f64,
     pub(crate) count: usize,
+    /// Step that the readings are rounded to, counts; 0 for none.
+    pub(crate) step_counts: f64,
 }
 
 /// The state of the filter.
@@ -102,21 +104,22 @@ fn carried(p: &PoseMatrix, turned: Vec2) -> PoseMatrix {
 /// Control steps at the beginning that do not count: the start pose was fitted to them.
 const BURN_IN: usize = 48;
 
-/// Filters one stretch. `used` says for each row what counts; without it all that is there does.
-pub(crate) fn filter(world: &World<'_>, rows: &[LogRow], used: Option<&[Used]>) -> Option<Trace> {
+/// Filters one stretch. `used` says for each row what counts; without it all that is there does. `step_counts` is the
+/// step that the readings are rounded to, 0 for none.
+pub(crate) fn filter(world: &World<'_>, rows: &[LogRow], used: Option<&[Used]>, step_counts: f64) -> Option<Trace> {
     let mut forecast = Forecast::new(world).ok()?;
     let start = start_pose(rows, &forecast.machine().robot, world.rules())?;
     let mut covariance = [[0.0; 3]; 3];
     (covariance[0][0], covariance[1][1], covariance[2][2]) = (4e-6, 4e-6, 2.5e-3);
     let mut state = State { pose: start, covariance };
-    let mut trace = Trace { instants: Vec::with_capacity(rows.len()), ..Trace::default() };
+    let mut trace = Trace { instants: Vec::with_capacity(rows.len()), step_counts, ..Trace::default() };
     for (i, row) in rows.iter().enumerate() {
         forecast.tick(row.time_s);
         let usable = match used {
             Some(used) => used[i],
             None => available(row, i),
         };
-        let instant = step(&mut forecast, &mut state, row, usable, i >= BURN_IN);
+        let instant = step(&mut forecast, &mut state, (row, step_counts), usable, i >= BURN_IN);
         for m in (0..MEASURED).filter(|m| instant.used >> m & 1 == 1) {
             let e = instant.innovation[m];
             trace.log_likelihood -= 0.5 * e * e - instant.per_scale[m].ln();
@@ -138,7 +141,13 @@ fn available(row: &LogRow, index: usize) -> Used {
 }
 
 /// One control step.
-fn step(forecast: &mut Forecast<'_>, state: &mut State, row: &LogRow, usable: Used, counts: bool) -> Instant {
+fn step(
+    forecast: &mut Forecast<'_>,
+    state: &mut State,
+    (row, step_counts): (&LogRow, f64),
+    usable: Used,
+    counts: bool,
+) -> Instant {
     let mut instant = Instant {
         time_s: row.time_s,
         used: if counts { usable } else { 0 },
@@ -163,7 +172,7 @@ fn step(forecast: &mut Forecast<'_>, state: &mut State, row: &LogRow, usable: Us
     instant.sensed_from = state.pose;
     instant.covariance = state.covariance;
     let outlook = forecast.readings(state.pose, &state.covariance);
-    sense(forecast, state, (row, &outlook), usable, &mut instant);
+    sense(forecast, state, (row, step_counts, &outlook), usable, &mut instant);
     instant.moved_from = state.pose;
     let motion = forecast.motion(state.pose, row.command);
     let mut covariance = carried(&state.covariance, motion.turned);
@@ -212,7 +221,7 @@ fn camera_slopes(forecast: &Forecast<'_>, pose: Pose, seen: Vec2) -> [[f64; 3]; 
 fn sense(
     forecast: &Forecast<'_>,
     state: &mut State,
-    (row, outlook): (&LogRow, &Outlook),
+    (row, step_counts, outlook): (&LogRow, f64, &Outlook),
     usable: Used,
     instant: &mut Instant,
 ) {
@@ -227,7 +236,7 @@ fn sense(
             (0..3).map(|i| slope[i] * (p[i][0] * slope[0] + p[i][1] * slope[1] + p[i][2] * slope[2])).sum();
         let own_variance = noise.deviation(outlook.mean[lane]).powi(2) + outlook.edge_variance[lane];
         let deviation = (own_variance + pose_variance).sqrt();
-        let read = cut(outlook.mean[lane], deviation);
+        let read = cut(outlook.mean[lane], deviation, step_counts);
         (instant.expected[lane], instant.deviation[lane]) = (read.mean, deviation);
         if usable >> m & 1 == 0 {
             continue;

@@ -1,19 +1,23 @@
-//! A normal variable that is cut at zero.
+//! A normal variable that is cut at zero and perhaps rounded before.
 
 use statrs::function::erf::erfc;
 
-/// Mean and variance of max(0, X), and the change of that mean with X's.
+/// Mean and variance of what becomes of X, and the change of that mean with X's.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Cut {
     pub(crate) mean: f64,
     pub(crate) variance: f64,
-    /// Probability that X is not cut, which is d mean / d (mean of X).
+    /// d mean / d (mean of X): for a plain cut the probability that X is above it.
     pub(crate) open: f64,
 }
 
-/// The moments of a reading that is normal with this mean and standard deviation before it is cut to [0, inf).
+/// The moments of a reading that is normal with this mean and standard deviation before it is rounded to multiples of
+/// `step` (0 for none) and cut to [0, inf).
 #[inline]
-pub(crate) fn cut(mean: f64, deviation: f64) -> Cut {
+pub(crate) fn cut(mean: f64, deviation: f64, step: f64) -> Cut {
+    if step > 0.0 {
+        return rounded(mean, deviation, step);
+    }
     let z = mean / deviation;
     if z > 6.0 {
         return Cut { mean, variance: deviation * deviation, open: 1.0 };
@@ -25,13 +29,37 @@ pub(crate) fn cut(mean: f64, deviation: f64) -> Cut {
     Cut { mean: first, variance: (second - first * first).max(1e-6 * deviation * deviation), open }
 }
 
+/// The same for multiples k of a step, by the probabilities of reaching each.
+fn rounded(mean: f64, deviation: f64, step: f64) -> Cut {
+    if step < 0.5 * deviation {
+        // Sheppard's correction; the rounding of a finer step is as good as noise.
+        return cut(mean, (deviation * deviation + step * step / 12.0).sqrt(), 0.0);
+    }
+    let sure = (((mean - 7.0 * deviation) / step).floor().max(0.0)) as usize;
+    let most = (((mean + 7.0 * deviation) / step).ceil().max(0.0)) as usize + 1;
+    let (mut first, mut second, mut open) = (0.0, 0.0, 0.0);
+    for k in sure + 1..=most {
+        let z = ((k as f64 - 0.5) * step - mean) / deviation;
+        let reach = 0.5 * erfc(z * std::f64::consts::FRAC_1_SQRT_2);
+        first += reach;
+        // About the multiple that is surely reached: k^2 - (k - 1)^2 of it.
+        second += (2.0 * (k - sure) as f64 - 1.0) * reach;
+        open += (-0.5 * z * z).exp();
+    }
+    Cut {
+        mean: step * (sure as f64 + first),
+        variance: (step * step * (second - first * first)).max(0.01 * deviation * deviation),
+        open: open * step / (deviation * std::f64::consts::TAU.sqrt()),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
     fn a_cut_standard_normal_by_hand() {
-        let half = cut(0.0, 1.0);
+        let half = cut(0.0, 1.0, 0.0);
         assert!((half.mean - 1.0 / std::f64::consts::TAU.sqrt()).abs() < 1e-12);
         assert!((half.variance - (0.5 - 1.0 / std::f64::consts::TAU)).abs() < 1e-12);
         assert!((half.open - 0.5).abs() < 1e-12);
@@ -39,11 +67,18 @@ mod tests {
 
     #[test]
     fn slope_is_the_open_share_and_far_above_nothing_is_cut() {
-        for mean in [-9.0, 0.0, 4.0, 20.0] {
+        for (mean, step) in [(-9.0, 0.0), (0.0, 0.0), (4.0, 0.0), (20.0, 0.0), (30.0, 20.0), (100.0, 35.0)] {
             let h = 1e-4;
-            let slope = (cut(mean + h, 8.0).mean - cut(mean - h, 8.0).mean) / (2.0 * h);
-            assert!((slope - cut(mean, 8.0).open).abs() < 1e-7, "{mean}");
+            let slope = (cut(mean + h, 8.0, step).mean - cut(mean - h, 8.0, step).mean) / (2.0 * h);
+            assert!((slope - cut(mean, 8.0, step).open).abs() < 1e-6, "{mean} {step}");
         }
-        assert_eq!(cut(100.0, 8.0), Cut { mean: 100.0, variance: 64.0, open: 1.0 });
+        assert_eq!(cut(100.0, 8.0, 0.0), Cut { mean: 100.0, variance: 64.0, open: 1.0 });
+    }
+
+    #[test]
+    fn a_coarse_step_is_a_coin() {
+        // Half way between two multiples, with little noise: either, with equal chance.
+        let coin = cut(150.0, 5.0, 100.0);
+        assert!((coin.mean - 150.0).abs() < 1e-9 && (coin.variance - 2500.0).abs() < 1e-6);
     }
 }

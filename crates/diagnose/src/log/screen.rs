@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use sim::{Error, Forecast, World};
 
-use super::catalogue::Variant;
+use super::catalogue::{Variant, stage_of};
 use super::columns::column;
 use super::filter::{MEASURED, Trace};
 
@@ -27,7 +27,10 @@ pub(crate) fn normals(runs: &[(World<'_>, Trace)], variants: &[Variant]) -> Resu
 
 fn normal((world, trace): &(World<'_>, Trace), variant: &Variant) -> Result<Normal, Error> {
     let columns = (variant.settings().into_iter())
-        .map(|setting| Ok(column(&mut Forecast::beside(world, &[setting])?, variant.spec.stage, trace)))
+        .map(|setting| {
+            let stage = stage_of(&setting);
+            Ok(column(&mut Forecast::beside(world, &[setting])?, stage, trace))
+        })
         .collect::<Result<Vec<_>, Error>>()?;
     Ok(normal_of(trace, &columns))
 }

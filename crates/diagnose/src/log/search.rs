@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
-use sim::{Pattern, Setting};
+use sim::{Pattern, Setting, UNLISTED};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::catalogue::{Shape, Variant};
@@ -57,7 +57,7 @@ pub(crate) fn leads(evidence: &Evidence<'_>, variants: &[Variant], normals: &[Ve
     (variants.iter().zip(normals).enumerate())
         .flat_map(|(i, (variant, normals))| {
             let mut leads = vec![constant(i, normals)];
-            if !(variant.shape == Shape::Scan && variant.spec.name != "cone-of-view") {
+            if patterns(variant) {
                 leads.push(by_time(i, normals));
                 if runs.len() > 1 {
                     leads.push(by_run(evidence, i, normals, &runs));
@@ -66,6 +66,15 @@ pub(crate) fn leads(evidence: &Evidence<'_>, variants: &[Variant], normals: &[Ve
             leads
         })
         .collect()
+}
+
+/// Whether a variant may differ by run or change in time: not where its place or its size is one of a scan.
+fn patterns(variant: &Variant) -> bool {
+    match variant.shape {
+        Shape::Scan => variant.spec.name == "cone-of-view",
+        Shape::Along => variant.spec.name == "directional-light",
+        Shape::Linear | Shape::Polar => *variant.spec != UNLISTED,
+    }
 }
 
 fn sums(normals: impl Iterator<Item = Normal>) -> Option<Normal> {
@@ -226,5 +235,27 @@ fn by_runs(evidence: &Evidence<'_>, variant: &Variant, runs: &[usize], parts: &[
         gain: parts.iter().map(|part| part.log_likelihood).sum::<f64>() - base,
         fitted: parts.iter().map(|part| part.knobs.len()).sum(),
         by: By::Run,
+    }
+}
+
+/// Refines several settings together from where each of them was best alone.
+pub(crate) fn together(evidence: &Evidence<'_>, parts: &[(Variant, Setting)], base: f64) -> Option<Refined> {
+    let settings: Vec<Setting> = parts.iter().map(|(_, setting)| setting.clone()).collect();
+    let knobs = (parts.iter().enumerate())
+        .filter(|(_, (_, setting))| !jumps(setting))
+        .flat_map(|(i, (variant, setting))| knobs(variant, i, &setting.pattern))
+        .collect();
+    Some(refined(refine(evidence, settings, knobs, 6)?, base, By::Constant))
+}
+
+/// The variants' multiples in a joint solution as a setting.
+pub(crate) fn start(variant: &Variant, multiples: &[f64]) -> Setting {
+    Setting::constant(variant.spec, variant.values_at(multiples))
+}
+
+impl Lead {
+    /// Where a refinement of the constant pattern begins.
+    pub(crate) fn start(&self, variant: &Variant) -> Setting {
+        start(variant, self.multiples[0].as_slice())
     }
 }

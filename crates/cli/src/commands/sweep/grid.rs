@@ -157,22 +157,43 @@ impl Point {
     ) -> Result<Self> {
         let value = |(axis, &place): (&Axis, &usize)| (axis.key.clone(), axis.values[place].clone());
         let chosen: Vec<(String, String)> = axes.iter().zip(&places).map(value).collect();
-        let config = chosen.iter().try_fold(base.file.config.clone(), |config, (key, value)| {
-            config.with(key, value).with_context(|| format!("--vary {key}={value}"))
-        })?;
+        let config = chosen
+            .iter()
+            .try_fold(base.file.config.clone(), |config, (key, value)| {
+                config
+                    .with(key, value)
+                    .with_context(|| format!("--vary {key}={value}"))
+            })?;
         let setup = setup(base, &config, scenes).map_err(|error| locate(base, &chosen, error))?;
-        let name: Vec<String> = chosen.iter().map(|(key, value)| format!("{key}={value}")).collect();
-        Ok(Self { name: name.join(", "), places, setup })
+        let name: Vec<String> = chosen
+            .iter()
+            .map(|(key, value)| format!("{key}={value}"))
+            .collect();
+        Ok(Self {
+            name: name.join(", "),
+            places,
+            setup,
+        })
     }
 }
 
-fn setup(base: &Base<'_>, config: &Config, scenes: &mut BTreeMap<String, Scene>) -> Result<Setup, sim::Error> {
+fn setup(
+    base: &Base<'_>,
+    config: &Config,
+    scenes: &mut BTreeMap<String, Scene>,
+) -> Result<Setup, sim::Error> {
     let model = setup::model(config, base.circuit)?;
     let machine = &model.machine;
-    let cut = format!("{:?} {} {} {:?}", model.wall, machine.robot.body_radius_m, machine.range_m, machine.mounts);
+    let cut = format!(
+        "{:?} {} {} {:?}",
+        model.wall, machine.robot.body_radius_m, machine.range_m, machine.mounts
+    );
     let scene = match scenes.get(&cut) {
         Some(scene) => scene.clone(),
-        None => scenes.entry(cut).or_insert(Scene::new(Arc::clone(base.circuit), &model, None)?).clone(),
+        None => scenes
+            .entry(cut)
+            .or_insert(Scene::new(Arc::clone(base.circuit), &model, None)?)
+            .clone(),
     };
     for run in 0..base.runs {
         scene.world(&model, run)?; // effects have values for every run
@@ -183,10 +204,15 @@ fn setup(base: &Base<'_>, config: &Config, scenes: &mut BTreeMap<String, Scene>)
 /// The error with the `--vary`, or the place in the model, where its key was set.
 fn locate(base: &Base<'_>, chosen: &[(String, String)], error: sim::Error) -> anyhow::Error {
     let around = |key: &str, at_fault: &str| {
-        at_fault.strip_prefix(key).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
+        at_fault
+            .strip_prefix(key)
+            .is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
     };
     let blamed = setup::blamed(&error);
-    match chosen.iter().find(|(key, _)| blamed.iter().any(|at_fault| around(key, at_fault))) {
+    match chosen
+        .iter()
+        .find(|(key, _)| blamed.iter().any(|at_fault| around(key, at_fault)))
+    {
         Some((key, value)) => anyhow!("--vary {key}={value}: {error}"),
         None => setup::locate(base.file, base.world, error),
     }
@@ -207,10 +233,19 @@ mod tests {
             set: Vec::new(),
             world: None,
         };
-        let file = setup::model_file(&ModelArgs { model: "roduit2007".into(), settings }).unwrap();
+        let file = setup::model_file(&ModelArgs {
+            model: "roduit2007".into(),
+            settings,
+        })
+        .unwrap();
         let world = file.world(None).unwrap();
         let circuit = setup::circuit(&world, 100).unwrap();
-        let base = Base { file: &file, world: &world, circuit: &circuit, runs: 1 };
+        let base = Base {
+            file: &file,
+            world: &world,
+            circuit: &circuit,
+            runs: 1,
+        };
         let vary: Vec<String> = vary.iter().map(|text| (*text).to_owned()).collect();
         Grid::new(&base, &vary).map_err(|error| format!("{error:#}"))
     }

@@ -1,0 +1,211 @@
+//! The decide stage: the commands are recomputed from the logged readings, and what is left is exact.
+
+use sim::{Controller, Model, Pattern, Setting, find};
+
+use super::rows::LogRow;
+use crate::Candidate;
+
+/// What the logged commands say of the controller.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Decided {
+    /// The declared controller gives the logged commands from the logged readings.
+    AsDeclared,
+    /// The declared controller gives them with other constants.
+    Changed(Vec<Candidate>),
+    /// No controller of this kind gives them: a wrong unit, another controller, or an effect that has no name.
+    NoController {
+        /// Share of the control steps that the best constants do not explain.
+        share: f64,
+    },
+    /// No control step has both readings and commands.
+    Unknown,
+}
+
+/// Largest errors of a written number: speeds have 5 decimals, readings 1.
+const SPEED_ROUNDING_M_S: f64 = 6e-6;
+const SUM_ROUNDING_COUNTS: f64 = 0.16;
+/// Share of the control steps that may miss by more, where a command was cut or a file was mended.
+const FORGIVEN: f64 = 2e-3;
+/// Relative change of a constant below which it is the declared one.
+const SAME: f64 = 2e-4;
+
+/// A control step as the controller saw it.
+#[derive(Debug, Clone, Copy)]
+struct Choice {
+    time_s: f64,
+    right_counts: f64,
+    left_counts: f64,
+    left_m_s: f64,
+    right_m_s: f64,
+}
+
+/// A line over time: value at the run's start and change per second.
+type Line = [f64; 2];
+
+/// One run's constants: speed V and the controller's own parameter, with the parameter's standard error.
+#[derive(Debug, Clone, Copy)]
+struct Constants {
+    speed_m_s: Line,
+    parameter: Line,
+    parameter_error: f64,
+    missed: f64,
+}
+
+/// The verdict over all runs.
+pub(crate) fn decided(model: &Model, runs: &[&[LogRow]]) -> Decided {
+    let choices: Vec<Vec<Choice>> = runs.iter().map(|rows| choices(model, rows)).collect();
+    if choices.iter().all(Vec::is_empty) {
+        return Decided::Unknown;
+    }
+    let fit = |sloped: bool| -> Vec<Option<Constants>> {
+        (choices.iter()).map(|run| (!run.is_empty()).then(|| constants(model, run, sloped))).collect()
+    };
+    let fits = |found: &[Option<Constants>]| found.iter().flatten().all(|run| run.missed <= FORGIVEN);
+    let still = fit(false);
+    let found = if fits(&still) { still } else { fit(true) };
+    if !fits(&found) {
+        let share = found.iter().flatten().map(|run| run.missed).fold(0.0, f64::max);
+        return Decided::NoController { share };
+    }
+    let controller = &model.machine.controller;
+    let parameter = match *controller {
+        Controller::Braitenberg { gain_per_count, .. } => gain_per_count,
+        Controller::RuleBased { threshold_counts, .. } => threshold_counts,
+    };
+    let speed = controller.speed_m_s();
+    let changed: Vec<Candidate> = [
+        candidate("controller-gain", &found, |run| (run.parameter.map(|p| p / parameter), run.parameter_error / parameter)),
+        candidate("controller-speed", &found, |run| (run.speed_m_s.map(|v| v / speed), SPEED_ROUNDING_M_S / speed * 0.05)),
+    ]
+    .into_iter()
+    .flatten()
+    .collect();
+    if changed.is_empty() { Decided::AsDeclared } else { Decided::Changed(changed) }
+}
+
+fn choices(model: &Model, rows: &[LogRow]) -> Vec<Choice> {
+    let limit_m_s = model.machine.robot.wheel_speed_limit_m_s - 2e-5;
+    (rows.iter().filter(|row| row.commands()))
+        .filter_map(|row| row.read().map(|readings| (row, readings)))
+        .map(|(row, s)| Choice {
+            time_s: row.time_s,
+            right_counts: s[0] + s[1] + s[2],
+            left_counts: s[5] + s[6] + s[7],
+            left_m_s: row.command.left_m_s,
+            right_m_s: row.command.right_m_s,
+        })
+        .filter(|choice| choice.left_m_s.abs() < limit_m_s && choice.right_m_s.abs() < limit_m_s)
+        .collect()
+}
+
+fn constants(model: &Model, run: &[Choice], sloped: bool) -> Constants {
+    match model.machine.controller {
+        Controller::Braitenberg { .. } => braitenberg(run, sloped),
+        Controller::RuleBased { threshold_counts, .. } => rules(run, threshold_counts, sloped),
+    }
+}
+
+/// V and K by least squares: the mean of the speeds is V, half their difference V K (Sl - Sr).
+fn braitenberg(run: &[Choice], sloped: bool) -> Constants {
+    let mean = line(run.iter().map(|c| (c.time_s, 1.0, 0.5 * (c.left_m_s + c.right_m_s))), sloped);
+    let difference = |c: &Choice| c.left_counts - c.right_counts;
+    let product = line(run.iter().map(|c| (c.time_s, difference(c), 0.5 * (c.left_m_s - c.right_m_s))), sloped);
+    let missed = |c: &&Choice| {
+        let speed = mean[0] + mean[1] * c.time_s;
+        let slope = product[0] + product[1] * c.time_s;
+        let turn = slope * difference(c);
+        let allowed = SPEED_ROUNDING_M_S + 2.0 * SUM_ROUNDING_COUNTS * slope.abs() + 2e-4 * speed.abs() * f64::from(u8::from(sloped));
+        (c.left_m_s - speed - turn).abs().max((c.right_m_s - speed + turn).abs()) > allowed
+    };
+    let count = run.len() as f64;
+    let spread: f64 = run.iter().map(|c| difference(c).powi(2)).sum();
+    let gain = product[0] / mean[0];
+    Constants {
+        speed_m_s: mean,
+        // (a + b t) / (c + d t) to first order in time.
+        parameter: [gain, (product[1] - gain * mean[1]) / mean[0]],
+        parameter_error: 3e-6 / mean[0].abs() / spread.max(1e-12).sqrt() + 1e-9 * gain.abs(),
+        missed: run.iter().filter(missed).count() as f64 / count,
+    }
+}
+
+/// V from the speeds' size, T from between the sums that turned the robot and those that did not.
+fn rules(run: &[Choice], declared_counts: f64, sloped: bool) -> Constants {
+    let speed = line(run.iter().map(|c| (c.time_s, 1.0, 0.5 * (c.left_m_s.abs() + c.right_m_s.abs()))), sloped);
+    let bracket = |slope: f64| {
+        let (mut low, mut high) = (0.0_f64, f64::INFINITY);
+        for c in run {
+            let (turns_left, turns_right) = (c.left_m_s < 0.0, c.right_m_s < 0.0);
+            let [right, left] = [c.right_counts, c.left_counts].map(|sum| sum - slope * c.time_s);
+            if turns_left { high = high.min(right) } else { low = low.max(right) }
+            if !turns_left {
+                if turns_right { high = high.min(left) } else { low = low.max(left) }
+            }
+        }
+        (low, high)
+    };
+    let end_s = run.last().map_or(1.0, |c| c.time_s.max(1.0));
+    let slopes = if sloped { 400 } else { 0 };
+    let slope = (-slopes..=slopes)
+        .map(|i| f64::from(i) / 400.0 * declared_counts / end_s)
+        .max_by(|a, b| (bracket(*a).1 - bracket(*a).0).total_cmp(&(bracket(*b).1 - bracket(*b).0)))
+        .unwrap_or(0.0);
+    let (low, high) = bracket(slope);
+    let inside = (low - 2.0 * SUM_ROUNDING_COUNTS..=high + 2.0 * SUM_ROUNDING_COUNTS).contains(&declared_counts);
+    let threshold = if inside && slope == 0.0 { declared_counts } else { 0.5 * (low + high.min(low + 1e3)) };
+    let missed = |c: &&Choice| {
+        let limit = threshold + slope * c.time_s;
+        let near = |sum: f64| (sum - limit).abs() <= 2.0 * SUM_ROUNDING_COUNTS + 0.01 * limit * f64::from(u8::from(sloped));
+        let turns_left = c.right_counts > limit;
+        let turns_right = !turns_left && c.left_counts > limit;
+        let size = speed[0] + speed[1] * c.time_s;
+        let wrong_way = turns_left != (c.left_m_s < 0.0) || turns_right != (c.right_m_s < 0.0);
+        let allowed = SPEED_ROUNDING_M_S + 2e-4 * size * f64::from(u8::from(sloped));
+        let wrong_size = (c.left_m_s.abs() - size).abs().max((c.right_m_s.abs() - size).abs()) > allowed;
+        wrong_size || wrong_way && !near(c.right_counts) && !near(c.left_counts)
+    };
+    Constants {
+        speed_m_s: speed,
+        parameter: [threshold, slope],
+        parameter_error: ((high - low).abs() / 12.0_f64.sqrt()).min(0.1 * declared_counts),
+        missed: run.iter().filter(missed).count() as f64 / run.len() as f64,
+    }
+}
+
+/// Least squares of y = (a + b t) x; b only if `sloped`.
+fn line(points: impl Iterator<Item = (f64, f64, f64)>, sloped: bool) -> Line {
+    let mut s = [0.0; 5];
+    for (t, x, y) in points {
+        let terms = [x * x, t * x * x, t * t * x * x, x * y, t * x * y];
+        s.iter_mut().zip(terms).for_each(|(s, term)| *s += term);
+    }
+    let determinant = s[0] * s[2] - s[1] * s[1];
+    if !sloped || determinant <= 1e-9 * s[0] * s[2] {
+        return [if s[0] > 0.0 { s[3] / s[0] } else { 0.0 }, 0.0];
+    }
+    [(s[2] * s[3] - s[1] * s[4]) / determinant, (s[0] * s[4] - s[1] * s[3]) / determinant]
+}
+
+/// The effect with its factor as it goes over the runs; `None` where it is 1 in all of them.
+fn candidate(name: &str, runs: &[Option<Constants>], factor: impl Fn(&Constants) -> (Line, f64)) -> Option<Candidate> {
+    let factors: Vec<(Line, f64)> = runs.iter().map(|run| run.as_ref().map_or(([1.0, 0.0], 0.0), &factor)).collect();
+    let beyond = |value: f64, error: f64| value.abs() > SAME.max(4.0 * error);
+    let slopes = factors.iter().any(|(line, _)| line[1].abs() * 300.0 > 5e-3);
+    if !slopes && !factors.iter().any(|(line, error)| beyond(line[0] - 1.0, *error)) {
+        return None;
+    }
+    let count = factors.len() as f64;
+    let mean = |i: usize| factors.iter().map(|(line, _)| line[i]).sum::<f64>() / count;
+    let differ = factors.iter().any(|(line, error)| beyond(line[0] - factors[0].0[0], 2.0 * *error));
+    let error = factors.iter().map(|(_, error)| error).fold(0.0, |a: f64, b| a.max(*b));
+    let spec = find(name).ok()?;
+    let (pattern, standard_errors) = if slopes {
+        (Pattern::ByTime { start: vec![mean(0)], per_s: vec![mean(1)] }, vec![error, error / 300.0])
+    } else if differ {
+        (Pattern::ByRun(factors.iter().map(|(line, _)| vec![line[0]]).collect()), factors.iter().map(|(_, e)| *e).collect())
+    } else {
+        (Pattern::Constant(vec![mean(0)]), vec![error])
+    };
+    let fitted = standard_errors.len();
+    Some(Candidate { setting: Setting { spec, pattern }, standard_errors, gain: f64::INFINITY, fitted })
+}

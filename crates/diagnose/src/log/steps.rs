@@ -1,0 +1,81 @@
+//! The multiples to which readings were rounded, by looking at the values that occur.
+
+use super::rows::LogRow;
+
+/// Readings looked at.
+const LOOKED_AT: usize = 4000;
+
+/// The step of which all readings are multiples, counts; `None` if they are not multiples of anything coarser than
+/// what the file can tell.
+pub(crate) fn reading_step(runs: &[&[LogRow]]) -> Option<f64> {
+    let readings: Vec<f64> = (runs.iter().flat_map(|rows| rows.iter()).filter_map(LogRow::read))
+        .flatten()
+        .copied()
+        .filter(|&reading| reading > 0.0 && reading < 4000.0)
+        .take(40 * LOOKED_AT)
+        .collect();
+    let every = (readings.len() / LOOKED_AT).max(1);
+    let some: Vec<f64> = readings.iter().copied().step_by(every).collect();
+    if some.len() < 100 {
+        return None;
+    }
+    let smallest = readings.iter().copied().fold(f64::INFINITY, f64::min);
+    // The smallest reading is the step itself or a small multiple of it, so the step is a fraction of it.
+    let guess = (1..=12).map(|k| smallest / f64::from(k)).find(|&step| step > 0.45 && fits(&some, step))?;
+    Some(sharpened(&readings, guess))
+}
+
+/// Whether all readings lie within the file's rounding of multiples of something near the guess.
+fn fits(readings: &[f64], guess: f64) -> bool {
+    let step = sharpened(readings, guess);
+    let off = |reading: f64| (reading - (reading / step).round() * step).abs();
+    let near = readings.iter().filter(|&&reading| off(reading) < 0.06).count();
+    near as f64 > 0.98 * readings.len() as f64 && step > 0.45
+}
+
+/// The step by least squares, with ever larger multiples as it gets sharper.
+fn sharpened(readings: &[f64], guess: f64) -> f64 {
+    let mut step = guess;
+    let mut reach = 5.0;
+    for _ in 0..10 {
+        let (mut top, mut bottom) = (0.0, 0.0);
+        for &reading in readings.iter().filter(|&&reading| reading < reach * step) {
+            let k = (reading / step).round();
+            top += k * reading;
+            bottom += k * k;
+        }
+        if bottom > 0.0 {
+            step = top / bottom;
+        }
+        reach *= 3.0;
+    }
+    step
+}
+
+#[cfg(test)]
+mod tests {
+    use sim::WheelSpeeds;
+
+    use super::*;
+
+    fn rows(step: f64) -> Vec<LogRow> {
+        (0..4000)
+            .map(|i| {
+                let raw = |lane: usize| f64::from(i * 7 % 977) * 0.731 + lane as f64 * 13.3;
+                let rounded = |x: f64| if step > 0.0 { (x / step).round() * step } else { x };
+                let readings = std::array::from_fn(|lane| (10.0 * rounded(raw(lane))).round() / 10.0);
+                LogRow { time_s: 0.064 * f64::from(i), observed: None, readings, command: WheelSpeeds::default() }
+            })
+            .collect()
+    }
+
+    #[test]
+    fn finds_a_step_and_nothing_where_there_is_none() {
+        for step in [2.5, 7.3, 41.77, 139.49] {
+            let rows = rows(step);
+            let found = reading_step(&[&rows]).unwrap();
+            assert!((found / step - 1.0).abs() < 1e-3, "{found} for {step}");
+        }
+        assert_eq!(reading_step(&[&rows(0.0)]), None);
+    }
+}
