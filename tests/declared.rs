@@ -206,6 +206,9 @@ fn energy_p(what: &str, theirs: &[Vec<f64>], ours: &[Vec<f64>]) -> f64 {
     test.p
 }
 
+/// What is compared of each lap.
+type Sample = fn(&[Run], &Gates) -> Vec<Vec<f64>>;
+
 /// Nothing but the inner wall near gates 30 to 50 differs, see above.
 const AS_THEIR_WALLS: &str = "wall.max_error_m=0.00497";
 
@@ -213,7 +216,7 @@ fn cannot_be_told_apart(controller: &str) {
     let (gates, theirs) = (gates(), theirs(controller));
     assert_eq!(theirs.len(), RUNS);
     let ours = ours(controller, 8, &["--log", "--seed", "1"]);
-    let samples: [(&str, fn(&[Run], &Gates) -> Vec<Vec<f64>>); 3] = [
+    let samples: [(&str, Sample); 3] = [
         ("gate positions", positions),
         ("lap times", lap_times),
         ("readings", readings),

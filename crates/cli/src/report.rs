@@ -83,6 +83,13 @@ fn write_block(html: &mut String, block: &Block) -> Result<()> {
         }
         Block::Picture(picture) => write_picture(html, picture)?,
         Block::Claims(claims) => write_claims(html, claims),
+        Block::Linked { path, caption } => {
+            let (path, caption) = (escape(path), escape(caption));
+            let _ = writeln!(
+                html,
+                "<figure>\n<div class=\"wide\"><img src=\"{path}\" alt=\"{caption}\"></div>\n<figcaption>{caption}</figcaption>\n</figure>"
+            );
+        }
     }
     Ok(())
 }

@@ -61,7 +61,9 @@ fn text(rows: &[Row], cone: &[(usize, [f64; 2])], rungs: &[Rung], document: &ser
     for row in rows {
         let cells = ["brute", "bvh", "default"].map(|name| format!("{:.0}", row.ns_per_reading[name]));
         let steps = ["brute", "bvh", "default"].map(|name| format!("{:.0}", row.ns_per_step[name]));
-        let first = [row.segments.to_string(), format!("{:.3}", 1000.0 * row.max_error_m)];
+        let error_mm = 1000.0 * row.max_error_m;
+        let error = if error_mm < 0.01 { format!("{error_mm:.1e}") } else { format!("{error_mm:.3}") };
+        let first = [row.segments.to_string(), error];
         cost.push(first.into_iter().chain(cells).chain(steps));
     }
     let mut text = cost.to_text();

@@ -10,9 +10,16 @@ use crate::dataset::DataSet;
 use crate::experiments::{Block, Claim, EXPERIMENTS, Measurements, Outcome, Section, Study};
 use crate::interrupt;
 use crate::output::{OutDir, Work};
+use crate::ray_study;
 use crate::report::Report;
 use crate::session::Session;
 use crate::table::Table;
+
+/// Numbers of segments whose ray casting is measured.
+const SEGMENTS: [usize; 5] = [15, 47, 105, 1000, 10_000];
+
+/// Draws behind the ladder of wall errors, at the most.
+const LADDER_DRAWS: usize = 20;
 
 /// Where the report goes if `--out` does not say.
 const FOLDER: &str = "lapwing-report";
@@ -43,10 +50,19 @@ pub(crate) fn run(session: &Session, args: &Reproduce) -> Result<()> {
         Ok(outcome)
     };
     let outcomes: Vec<Outcome> = EXPERIMENTS.iter().map(outcome).collect::<Result<_>>()?;
+    progress.message("casting rays");
+    let costs = ray_study::measure(&study.standard, &study.measured.circuit, &SEGMENTS, &|| ())?;
+    let ladder_draws = (session.seed(), draws.min(LADDER_DRAWS), study.laps);
+    let rungs = ray_study::ladder(&study.standard, &study.measured.circuit, &study.real, ladder_draws)?;
     drop(progress);
     let tables = tables_json(session.seed(), draws, &outcomes);
     let text = text(&outcomes, &out);
-    write(&folder, &tables, report(session.seed(), &study, outcomes))?;
+    let mut files = report(session.seed(), &study, outcomes);
+    let place = files.report.sections.len() - 2; // after the experiments
+    files.report.sections.insert(place, ray_study::section(&rungs, ladder_draws.1));
+    files.csv.push(("ladder.csv", ray_study::ladder_table(&rungs).to_csv()));
+    write(&folder, &tables, files)?;
+    folder.write(ray_study::PICTURE, ray_study::figure(&costs, &rungs).to_svg()?)?;
     interrupt::check()?;
     folder.finish(&session.manifest(configuration, inputs))?;
     if args.json {

@@ -32,6 +32,12 @@ pub(crate) enum Block {
     Table(Table),
     Picture(Box<Picture>),
     Claims(Vec<Claim>),
+    /// A figure that stays in a file of its own, because a clock measured it and the page must not depend on that.
+    Linked {
+        /// Its path from the page.
+        path: String,
+        caption: String,
+    },
 }
 
 /// A numbered figure.

@@ -135,10 +135,10 @@ fn of(spec: &'static Spec, wall_lengths_m: [f64; 2]) -> Vec<Variant> {
         "directional-light" => (0..12)
             .map(|i| along(spec, &[0.0, TAU / 12.0 * f64::from(i)], (0, 1.0), &[0, 1]))
             .collect(),
-        "wall-bump" => places(wall_lengths_m, 0.08)
+        "wall-bump" => places(wall_lengths_m, 0.11)
             .map(|(wall, position)| along(spec, &[wall, position, 0.0, 0.08], (2, 5e-4), &[1, 2, 3]))
             .collect(),
-        "reflectance-patch" => places(wall_lengths_m, 0.1)
+        "reflectance-patch" => places(wall_lengths_m, 0.13)
             .map(|(wall, position)| along(spec, &[wall, position, 0.1, 1.0], (3, 0.02), &[1, 2, 3]))
             .collect(),
         _ => Vec::new(),

@@ -2,7 +2,7 @@
 //! and where a wall is nearly straight a micrometre of tolerance moves a corner by centimetres. The logs say which
 //! points were looked at.
 
-use sim::{Model, Scene, Vec2};
+use sim::{Model, Scene, Setting, Vec2};
 use track::{Chain, Side, Vertex, Wall};
 
 use super::evidence::Evidence;
@@ -23,8 +23,14 @@ pub(crate) const EXACT: Corners = Corners { per_span: 0, before: true };
 /// What programs commonly look at.
 const PER_SPAN: [usize; 7] = [50, 64, 100, 128, 200, 256, 500];
 
-/// The scene whose corners the logs like best, if they like it clearly better than the declared one.
-pub(crate) fn recut(scene: &Scene, model: &Model, wide: &Model, evidence: &Evidence<'_>) -> Option<(Corners, Scene)> {
+/// The scene whose corners the logs like best beside these effects, if they like it clearly better than the declared one.
+pub(crate) fn recut(
+    scene: &Scene,
+    model: &Model,
+    wide: &Model,
+    evidence: &Evidence<'_>,
+    settings: &[Setting],
+) -> Option<(Corners, Scene)> {
     /// Log-likelihood by which another cut must win.
     const CLEARLY: f64 = 12.0;
     let first = evidence.of_run(*evidence.runs().first()?);
@@ -38,13 +44,13 @@ pub(crate) fn recut(scene: &Scene, model: &Model, wide: &Model, evidence: &Evide
             if chains[0].vertices.len() == outer && chains[1].vertices.len() == inner {
                 let [outer, inner] = chains;
                 let scene = scene.recut(wide, outer, inner);
-                let likelihood = first.elsewhere(&scene).likelihood(&[])?;
+                let likelihood = first.elsewhere(&scene).likelihood(settings)?;
                 tried.push((likelihood, Corners { per_span, before }, scene));
             }
         }
     }
     let (_, corners, scene) = tried.into_iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
-    let gained = evidence.elsewhere(&scene).likelihood(&[])? - evidence.likelihood(&[])?;
+    let gained = evidence.elsewhere(&scene).likelihood(settings)? - evidence.likelihood(settings)?;
     (gained > CLEARLY).then_some((corners, scene))
 }
 

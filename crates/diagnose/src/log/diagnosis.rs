@@ -15,6 +15,7 @@ use super::noise::noises;
 use super::pairs::pairs;
 use super::rows::LogRow;
 use super::screen::normals;
+use super::refine::jumps;
 use super::search::{By, Lead, Refined, leads, price, pursue, shortlist, tail, together};
 use super::steps::reading_step;
 use crate::{Candidate, Error};
@@ -68,7 +69,7 @@ pub struct UnlistedEffect {
 /// How white the filter's innovations of one measured number are.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Channel {
-    /// Innovations that count.
+    /// Innovations that count; of readings only those that are far from being cut.
     pub count: usize,
     /// Their mean square, 1 under the model.
     pub mean_square: f64,
@@ -120,11 +121,24 @@ pub fn diagnose_logs(model: &Model, scene: &Scene, runs: &[&[LogRow]]) -> Result
     if declared.stretches.is_empty() {
         return Err(Error::NoLog);
     }
-    let (corners, recut) = recut(&scene, model, &wide, &declared).map_or((EXACT, None), |(c, s)| (c, Some(s)));
-    let evidence = recut.as_ref().map_or_else(|| declared.elsewhere(&scene), |scene| declared.elsewhere(scene));
-    let mut search = Search::new(evidence, step)?;
-    search.run();
-    Ok(search.answer(decide, corners))
+    let first = recut(&scene, model, &wide, &declared, &[]);
+    let mut search = Search::new(declared.elsewhere(first.as_ref().map_or(&scene, |found| &found.1)), step)?;
+    let corners = |cut: &Option<(Corners, Scene)>| cut.as_ref().map_or(EXACT, |found| found.0);
+    let Some(leads) = search.alone() else { return Ok(search.answer(decide, corners(&first))) };
+    // A large effect blurs where the corners are: they are looked for again beside the best candidate.
+    let settings = search.found.first().map_or(Vec::new(), |best| best.settings.clone());
+    let again = recut(&scene, model, &wide, &declared, &settings);
+    let better = again.as_ref().map_or(&scene, |found| &found.1);
+    if corners(&again) == corners(&first) {
+        search.finish(&leads);
+        return Ok(search.answer(decide, corners(&first)));
+    }
+    let mut renewed = Search::new(declared.elsewhere(better), step)?;
+    renewed.p = search.p;
+    renewed.found = search.found.iter().filter_map(|found| renewed.renew(found)).collect();
+    renewed.sort();
+    renewed.finish(&leads);
+    Ok(renewed.answer(decide, corners(&again)))
 }
 
 /// A probability below which something is there: one false alarm in a hundred data sets.
@@ -185,23 +199,54 @@ impl<'a> Search<'a> {
         Some((traces, leads))
     }
 
-    fn run(&mut self) {
-        let Some((traces, leads)) = self.screen(&[]) else { return };
+    /// Single effects; `None` if there is nothing to explain, else the leads at the declared model.
+    fn alone(&mut self) -> Option<Vec<Lead>> {
+        let (_, leads) = self.screen(&[])?;
         let noise = noises(&self.evidence, &[], self.total());
-        let chance = noise.iter().map(|n| tail(2.0 * n.gain, 1) * 6.0).fold(1.0, f64::min);
-        self.p = chance.min(least_p(&leads));
+        self.p = by_chance(&noise).min(least_p(&leads));
         if self.p >= ALARM {
-            return;
+            return None;
         }
-        let list = shortlist(&leads, &self.variants, 8);
-        let pursued: Vec<Refined> = (list.par_iter())
+        let list = self.promising(shortlist(&leads, &self.variants, 8));
+        self.found = (list.par_iter())
             .filter_map(|lead| pursue(&self.evidence, &self.variants[lead.variant], lead, &self.base))
             .collect();
-        self.found = pursued;
         self.sort();
         self.accept_noise(noise);
         self.sort();
-        self.second(&traces, &leads);
+        Some(leads)
+    }
+
+    /// The leads that gain, where linear algebra puts them, a fair share of what the best of them gains there.
+    fn promising(&self, list: Vec<Lead>) -> Vec<Lead> {
+        let gains: Vec<f64> = (list.par_iter())
+            .map(|lead| {
+                let setting = lead.start(&self.variants[lead.variant]);
+                self.evidence.likelihood(&[setting]).map_or(0.0, |likelihood| likelihood - self.total())
+            })
+            .collect();
+        let best = gains.iter().copied().fold(0.0, f64::max);
+        let keeps = |(lead, gain): &(Lead, f64)| lead.by == By::Run || *gain > 0.2 * best || lead.gain > 0.9 * best;
+        list.into_iter().zip(gains).filter(keeps).map(|(lead, _)| lead).collect()
+    }
+
+    /// A candidate refined again, from where it is.
+    fn renew(&self, found: &Refined) -> Option<Refined> {
+        let variant = self.variants.iter().find(|variant| *variant.spec == *found.settings[0].spec);
+        match (variant, found.by) {
+            (Some(variant), By::Constant) if !jumps(&found.settings[0]) => {
+                together(&self.evidence, &[(variant.clone(), found.settings[0].clone())], self.total())
+            }
+            _ => {
+                let gain = self.evidence.likelihood(&found.settings)? - self.total();
+                Some(Refined { gain, ..found.clone() })
+            }
+        }
+    }
+
+    /// Further effects, and whether what is left matters.
+    fn finish(&mut self, leads: &[Lead]) {
+        self.second(leads);
         self.sort();
         self.judge();
     }
@@ -215,43 +260,51 @@ impl<'a> Search<'a> {
         /// Log-likelihood that a column may still gain then.
         const LEFT: f64 = 14.0;
         let best = self.found.first().map_or(0.0, Refined::score);
-        let strongest = noise.into_iter().filter(|n| n.score() > best.max(4.0)).collect::<Vec<_>>();
-        for one in strongest {
-            let left = self.screen(&one.settings).map_or(f64::INFINITY, |(_, leads)| {
-                leads.iter().map(Lead::score).fold(0.0, f64::max)
-            });
+        let Some(one) = noise.into_iter().max_by(|a, b| a.gain.total_cmp(&b.gain)) else { return };
+        if one.score() > best.max(4.0) {
+            let left = self.screen(&one.settings).map_or(f64::INFINITY, |(_, leads)| most(&leads));
             if left < LEFT {
                 self.found.push(one);
             }
         }
     }
 
-    /// Looks for a second effect beside the best ones, and for the best pairs.
-    fn second(&mut self, traces: &[(World<'a>, Trace)], first: &[Lead]) {
+    /// Looks for a second effect beside the best one, and for the best pairs.
+    fn second(&mut self, first: &[Lead]) {
         let Some(best) = self.found.first().cloned() else { return };
-        let Some((_, leads)) = self.screen(&best.settings) else { return };
+        let Some((traces, leads)) = self.screen(&best.settings) else { return };
+        self.settle(&traces, &leads, best.gain);
         let noise = noises(&self.evidence, &best.settings, self.total() + best.gain);
-        let chance = noise.iter().map(|n| tail(2.0 * n.gain, 1) * 6.0).fold(1.0, f64::min);
-        if least_p(&leads).min(chance) >= 1e-3 {
+        if self.remainder.1.min(by_chance(&noise)) >= 1e-3 {
             return;
         }
         let mut more: Vec<Refined> = Vec::new();
-        for one in noise.into_iter().filter(|n| n.gain > 10.0) {
-            let mut one = one;
-            one.gain += best.gain;
-            one.fitted += best.fitted;
-            let mut errors = best.standard_errors.clone();
-            errors.extend(one.standard_errors);
-            one.standard_errors = errors;
-            more.push(one);
+        if self.remainder.0 < MATTERS || self.remainder.1 >= 1e-3 {
+            let noise = noise.into_iter().filter(|n| n.gain > 10.0).max_by(|a, b| a.gain.total_cmp(&b.gain));
+            more.extend(noise.map(|n| n.after(&best)));
         }
         if best.by == By::Constant {
             more.extend(self.beside(&best, &leads));
-            more.extend(self.joint(traces, first));
+            more.extend(self.joint(first));
         }
         // Each further value must gain ten.
         more.retain(|pair| pair.gain - best.gain > 10.0 * (pair.fitted.saturating_sub(best.fitted)).max(1) as f64);
+        if more.is_empty() {
+            return;
+        }
         self.found.extend(more);
+        self.sort();
+        let best = self.found[0].clone();
+        if let Some((traces, leads)) = self.screen(&best.settings) {
+            self.settle(&traces, &leads, best.gain);
+        }
+    }
+
+    /// Notes what is left beside an explanation.
+    fn settle(&mut self, traces: &[(World<'a>, Trace)], leads: &[Lead], gain: f64) {
+        self.channels = channels(traces);
+        let left = most(leads);
+        self.remainder = (left / (left + gain).max(1e-9), least_p(leads));
     }
 
     /// The best effect with each of the leads that are left beside it.
@@ -259,7 +312,7 @@ impl<'a> Search<'a> {
         let of_best = self.variants.iter().find(|v| *v.spec == *best.settings[0].spec);
         let Some(of_best) = of_best else { return Vec::new() };
         let constant: Vec<Lead> = leads.iter().filter(|lead| lead.by == By::Constant).cloned().collect();
-        let list = shortlist(&constant, &self.variants, 4);
+        let list = shortlist(&constant, &self.variants, 3);
         (list.par_iter())
             .filter_map(|lead| {
                 let variant = &self.variants[lead.variant];
@@ -270,11 +323,12 @@ impl<'a> Search<'a> {
     }
 
     /// The best pairs over the columns of the declared model.
-    fn joint(&self, traces: &[(World<'a>, Trace)], leads: &[Lead]) -> Vec<Refined> {
+    fn joint(&self, leads: &[Lead]) -> Vec<Refined> {
         const AMONG: usize = 36;
         let constant: Vec<Lead> = leads.iter().filter(|lead| lead.by == By::Constant).cloned().collect();
         let list: Vec<usize> = shortlist(&constant, &self.variants, AMONG).iter().map(|lead| lead.variant).collect();
-        (pairs(traces, &self.variants, &list, 4).par_iter())
+        let Some(traces) = self.evidence.traces(&[]) else { return Vec::new() };
+        (pairs(&traces, &self.variants, &list, 3).par_iter())
             .filter_map(|pair| {
                 let parts = pair.parts.clone().map(|(i, setting)| (self.variants[i].clone(), setting));
                 together(&self.evidence, &parts, self.total())
@@ -284,13 +338,7 @@ impl<'a> Search<'a> {
 
     /// What is left beside the best explanation, and whether that makes it dishonest to name it.
     fn judge(&mut self) {
-        let settings = self.found.first().map_or(Vec::new(), |best| best.settings.clone());
         let gain = self.found.first().map_or(0.0, |best| best.gain);
-        if let Some((traces, leads)) = self.screen(&settings) {
-            self.channels = channels(&traces);
-            let left = leads.iter().map(Lead::score).fold(0.0, f64::max);
-            self.remainder = (left / (left + gain).max(1e-9), least_p(&leads));
-        }
         let matters = self.remainder.1 < 1e-3 && self.remainder.0 > MATTERS;
         if matters || self.found.is_empty() {
             self.unlisted = self.characterise(gain);
@@ -328,19 +376,22 @@ impl<'a> Search<'a> {
 
     /// Noise that no normal distribution has: innovations with heavy tails that are no edges of readings.
     fn rough(&self) -> Option<UnlistedEffect> {
-        let camera = [self.channels[0], self.channels[1]];
-        let excess = camera.iter().map(|c| (c.kurtosis - 3.0) / (24.0 / c.count.max(1) as f64).sqrt()).fold(0.0, f64::max);
-        let heavy = camera.iter().map(|c| c.kurtosis).fold(0.0, f64::max) > 3.25;
-        (heavy && excess > 8.0).then(|| {
-            let lasting = camera.iter().map(|c| c.correlation).fold(0.0, f64::max) > -0.02;
-            UnlistedEffect {
-                stage: if lasting { Stage::Act } else { Stage::Observe },
-                acts_on: if lasting { "wheel speed" } else { "camera" }.to_owned(),
-                depends_on: "chance".to_owned(),
-                setting: None,
-                gain: self.found.first().map_or(0.0, |best| best.gain),
-            }
-        })
+        let heavy = |channel: &Channel| {
+            let deviation = (24.0 / channel.count.max(1) as f64).sqrt();
+            channel.kurtosis > 3.3 && channel.kurtosis - 3.0 > 10.0 * deviation
+        };
+        let camera = self.channels[..2].iter().any(heavy);
+        let readings = self.channels[2..].iter().filter(|channel| heavy(channel)).count();
+        if !camera && readings == 0 {
+            return None;
+        }
+        let (stage, acts_on) = match (camera, readings) {
+            (true, 0) => (Stage::Observe, "camera"),
+            (false, 1 | 2) => (Stage::Sense, "reading"),
+            _ => (Stage::Act, "wheel speed"),
+        };
+        let gain = self.found.first().map_or(0.0, |best| best.gain);
+        Some(UnlistedEffect { stage, acts_on: acts_on.into(), depends_on: "chance".into(), setting: None, gain })
     }
 
     fn answer(self, decide: Decided, corners: Corners) -> LogDiagnosis {
@@ -389,6 +440,16 @@ fn explanation(refined: &Refined, step: Option<&Candidate>) -> LogExplanation {
     LogExplanation { effects, gain: refined.gain + more, price: price(refined.fitted, refined.by) }
 }
 
+/// The best score.
+fn most(leads: &[Lead]) -> f64 {
+    leads.iter().map(Lead::score).fold(0.0, f64::max)
+}
+
+/// Probability that one of the noise effects gains as much by chance.
+fn by_chance(noise: &[Refined]) -> f64 {
+    noise.iter().map(|n| tail(2.0 * n.gain, 1) * 6.0).fold(1.0, f64::min)
+}
+
 /// Probability of the best lead by chance, given how many there are.
 fn least_p(leads: &[Lead]) -> f64 {
     let least = leads.iter().map(Lead::p).fold(1.0, f64::min);
@@ -401,6 +462,9 @@ fn channels(traces: &[(World<'_>, Trace)]) -> [Channel; MEASURED] {
         let (mut count, mut sums, mut before) = (0_usize, [0.0; 3], 0.0);
         for (_, trace) in traces {
             for instant in trace.instants.iter().filter(|instant| instant.used >> m & 1 == 1) {
+                if m >= 2 && instant.uncut[m - 2] < 4.0 * instant.deviation[m - 2] {
+                    continue;
+                }
                 let e = instant.innovation[m];
                 count += 1;
                 sums[0] += e * e;

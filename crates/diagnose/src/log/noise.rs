@@ -20,21 +20,27 @@ fn factor(evidence: &Evidence<'_>, settings: &[Setting], base: f64, spec: &'stat
         settings.push(Setting::constant(spec, [log.exp()]));
         evidence.assess(&settings, &[]).map(|found| found.total())
     };
-    let (mut middle, mut top, mut half) = (0.0, base, 0.1);
+    let (mut middle, mut top, mut half) = (0.0, base, 0.15);
     let mut bend = -1.0;
-    for _ in 0..6 {
+    for _ in 0..12 {
         let (low, high) = (at(middle - half)?, at(middle + half)?);
         let slope = (high - low) / (2.0 * half);
         bend = (high - 2.0 * top + low) / (half * half);
-        let step = if bend < 0.0 { (-slope / bend).clamp(-0.6, 0.6) } else { 0.6 * slope.signum() };
-        let then = at(middle + step)?;
-        if then > top {
-            (middle, top) = (middle + step, then);
+        let step = if bend < 0.0 { (-slope / bend).clamp(-1.2, 1.2) } else { 0.8 * slope.signum() };
+        // The best of the three is a start as good as the vertex of their parabola.
+        let tried = [(middle + step, at(middle + step)?), (middle - half, low), (middle + half, high)];
+        let best = tried.into_iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
+        let moved = (best.0 - middle).abs();
+        if best.1 > top {
+            (middle, top) = best;
         }
-        if step.abs() < 0.3 * half || then <= top && step.abs() < half {
+        if bend < 0.0 && (moved < 0.2 * half || step.abs() < 0.2 * half) {
             break;
         }
-        half = (0.5 * half).max(0.02);
+        half = (0.5 * half).max(0.01);
+    }
+    if middle == 0.0 {
+        return None;
     }
     let error = middle.exp() / (-bend).max(1e-9).sqrt();
     let mut all = settings.to_vec();
