@@ -109,6 +109,8 @@ fn remarks_go_to_stderr_and_quiet_silences_them() {
     ];
     let drive = [
         "drive",
+        "--name",
+        "laps",
         "roduit2007",
         "--runs",
         "1",
@@ -169,6 +171,8 @@ fn a_drive_is_a_data_set_that_compare_reads() {
     let scratch = Scratch::new();
     scratch.done([
         "drive",
+        "--name",
+        "laps",
         "roduit2007",
         "--runs",
         "27",

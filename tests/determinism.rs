@@ -5,15 +5,10 @@ use crate::support::{Scratch, differing, measured};
 /// Runs a command with one thread and with two; the folders and what is printed must be the same.
 fn assert_same(args: &[&str]) {
     let scratch = Scratch::new();
-    // One name for both, in folders of their own: a data set is called after its folder.
-    let ran = [1, 2].map(|threads| {
-        let (folder, threads) = (format!("{threads}/out"), threads.to_string());
-        std::fs::create_dir(scratch.path(&threads)).unwrap();
-        let ran = scratch.done(
-            args.iter()
-                .chain(&["--threads", &threads, "--quiet", "--out", &folder]),
-        );
-        (ran.stdout.replace(&folder, "out"), scratch.results(&folder))
+    let ran = [("1", "one_thread"), ("2", "two_threads")].map(|(threads, folder)| {
+        let more = ["--threads", threads, "--quiet", "--out", folder];
+        let ran = scratch.done(args.iter().chain(&more));
+        (ran.stdout.replace(folder, "out"), scratch.results(folder))
     });
     let [(one, one_files), (two, two_files)] = ran;
     assert_eq!(

@@ -421,6 +421,8 @@ fn clusters_with_too_few_laps() {
     for (name, seed) in [("x", "1"), ("y", "2")] {
         scratch.done([
             "drive",
+            "--name",
+            name,
             "roduit2007",
             "--runs",
             "1",
@@ -471,6 +473,8 @@ fn laps_that_skip_a_gate_are_set_aside_and_named() {
     let scratch = Scratch::new();
     scratch.done([
         "drive",
+        "--name",
+        "set",
         "roduit2007",
         "--runs",
         "2",

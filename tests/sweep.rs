@@ -103,6 +103,8 @@ fn a_point_is_simulated_as_if_it_stood_alone() {
     sweep("slip.level=1", "alone");
     scratch.done([
         "drive",
+        "--name",
+        "drive",
         "roduit2007",
         "--set",
         "slip.level=1",

@@ -4,16 +4,12 @@ use std::f64::consts::TAU;
 use std::path::PathBuf;
 
 use chart::{
-    Anchor, Aspect, Axis, Color, ColorMap, ColorScale, Corner, Dash, Direction, Ellipse, Figure,
-    Fill, GAP, Grid, Interval, Legend, Mark, Marker, Note, Panel, Shape, Share, Side, Style, Ticks,
+    Anchor, Aspect, Axis, Color, ColorMap, ColorScale, Corner, Dash, Direction, Ellipse, Figure, Fill, GAP,
+    Grid, Interval, Legend, Mark, Marker, Note, Panel, Shape, Share, Side, Style, Ticks,
 };
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let folder = PathBuf::from(
-        std::env::args()
-            .nth(1)
-            .ok_or("name a folder to write into")?,
-    );
+    let folder = PathBuf::from(std::env::args().nth(1).ok_or("name a folder to write into")?);
     std::fs::create_dir_all(&folder)?;
     let figures = [
         ("01-map", map()),
@@ -49,10 +45,8 @@ fn bell(counter: usize) -> f64 {
 /// A closed curve around the arena's middle, between the inner wall (0) and the outer wall (1).
 fn circuit(share: f64, turn: f64) -> [f64; 2] {
     let angle = -TAU * turn;
-    let dent = 0.10
-        * (-(angle.sin() + 1.0) * 9.0 * (angle.cos() - 0.15).powi(2)).exp()
-        * (1.0 - angle.sin())
-        / 2.0;
+    let dent =
+        0.10 * (-(angle.sin() + 1.0) * 9.0 * (angle.cos() - 0.15).powi(2)).exp() * (1.0 - angle.sin()) / 2.0;
     let radius = 0.36 + 0.19 * share - dent + 0.035 * (4.0 * angle).cos();
     [
         0.7 + 1.12 * radius * angle.cos(),
@@ -85,9 +79,7 @@ fn lap(series: usize, label: &str, dash: Dash) -> Mark {
     let wave = 3.0 + series as f64;
     let path = around(
         |turn| {
-            0.5 + 0.05 * series as f64
-                + 0.12 * (TAU * wave * turn).sin()
-                + 0.03 * (TAU * 31.0 * turn).sin()
+            0.5 + 0.05 * series as f64 + 0.12 * (TAU * wave * turn).sin() + 0.03 * (TAU * 31.0 * turn).sin()
         },
         2000,
     );
@@ -119,8 +111,8 @@ fn arena(title: &str, marks: Vec<Mark>) -> Panel {
 }
 
 fn map() -> Figure {
-    let joints = (0..4)
-        .flat_map(|joint| [0.0, 1.0].map(|share| circuit(share, f64::from(joint) / 4.0 + 0.04)));
+    let joints =
+        (0..4).flat_map(|joint| [0.0, 1.0].map(|share| circuit(share, f64::from(joint) / 4.0 + 0.04)));
     let gate = |index: usize| [0.0, 1.0].map(|share| circuit(share, index as f64 / 100.0));
     let gates = Style {
         width_px: 0.8,
@@ -154,17 +146,9 @@ fn map() -> Figure {
             ..arena(
                 "",
                 vec![
-                    Mark::new(
-                        "gates",
-                        gates,
-                        Shape::Segments((1..100).map(gate).collect()),
-                    ),
+                    Mark::new("gates", gates, Shape::Segments((1..100).map(gate).collect())),
                     walls(),
-                    Mark::new(
-                        "joints of the splines",
-                        squares,
-                        Shape::Points(joints.collect()),
-                    ),
+                    Mark::new("joints of the splines", squares, Shape::Points(joints.collect())),
                     Mark::new(
                         "lap",
                         Style {
@@ -244,11 +228,7 @@ fn clusters() -> Figure {
             0.09 * noise(series + 40),
         ];
         let (spread, angle_rad) = ([0.022, 0.012], 0.7 * series as f64);
-        let label = format!(
-            "Real {}{}",
-            controller + 1,
-            ["a", "b", "c", "d"][series % 4]
-        );
+        let label = format!("Real {}{}", controller + 1, ["a", "b", "c", "d"][series % 4]);
         let style = Style::series(series);
         let around = Ellipse {
             center,
@@ -317,8 +297,7 @@ fn response() -> Figure {
     };
     Figure {
         title: "Sensor response and two models".into(),
-        description: "The measured reading falls much faster than the original linear model."
-            .into(),
+        description: "The measured reading falls much faster than the original linear model.".into(),
         panels: vec![Panel {
             x: Axis {
                 range: Some([0.0, 0.1]),
@@ -636,11 +615,7 @@ fn ranking() -> Figure {
                 title: "(b) The same, upright".into(),
                 x: lying,
                 y: Axis::linear("share"),
-                marks: vec![Mark::new(
-                    "",
-                    Style::color(Color::SKY),
-                    bar(Direction::Vertical),
-                )],
+                marks: vec![Mark::new("", Style::color(Color::SKY), bar(Direction::Vertical))],
                 size_px: [300.0, 220.0],
                 ..Panel::default()
             },
@@ -687,14 +662,9 @@ fn residual() -> Figure {
 }
 
 fn sweep() -> Figure {
-    let edges = |count: usize| {
-        (0..=count)
-            .map(|edge| edge as f64 - 0.5)
-            .collect::<Vec<_>>()
-    };
-    let value = |row: usize, column: usize| {
-        0.5 + ((row as f64 - 2.0).powi(2) + (column as f64 - 3.0).powi(2)) * 0.8
-    };
+    let edges = |count: usize| (0..=count).map(|edge| edge as f64 - 0.5).collect::<Vec<_>>();
+    let value =
+        |row: usize, column: usize| 0.5 + ((row as f64 - 2.0).powi(2) + (column as f64 - 3.0).powi(2)) * 0.8;
     let cells = |(rows, columns): (usize, usize)| {
         (0..rows).flat_map(move |row| (0..columns).map(move |column| (row, column)))
     };
@@ -716,10 +686,7 @@ fn sweep() -> Figure {
                 "gain, 1/count",
                 ["0.0001", "0.0002", "0.0005", "0.001", "0.002", "0.005"],
             ),
-            y: Axis::categories(
-                "wall tolerance, m",
-                ["0.001", "0.002", "0.005", "0.01", "0.05"],
-            ),
+            y: Axis::categories("wall tolerance, m", ["0.001", "0.002", "0.005", "0.01", "0.05"]),
             marks: vec![Mark::new(
                 "",
                 Style::default(),
@@ -746,8 +713,7 @@ fn gates() -> Figure {
             .map(|gate| {
                 [
                     f64::from(gate),
-                    0.02 * (0.2 * f64::from(gate) + 0.3 * series as f64).sin()
-                        + 0.008 * series as f64,
+                    0.02 * (0.2 * f64::from(gate) + 0.3 * series as f64).sin() + 0.008 * series as f64,
                 ]
             })
             .collect()
@@ -775,8 +741,7 @@ fn gates() -> Figure {
         });
     Figure {
         title: "Mean laps on the gates".into(),
-        description: "Mean lateral position with one standard deviation for four wall tolerances."
-            .into(),
+        description: "Mean lateral position with one standard deviation for four wall tolerances.".into(),
         panels: vec![Panel {
             x: Axis {
                 range: Some([0.0, 99.0]),

@@ -7,8 +7,8 @@ use crate::figure::{Corner, Legend, Side};
 use crate::legend::Block;
 use crate::path::{Frame, Px};
 use crate::plan::{
-    GAP_PX, LABEL_GAP_PX, LABEL_TEXT_PX, Plan, SLANT_DEG, TICK_PX, TICK_TEXT_PX, TITLE_TEXT_PX,
-    lines_px, tick_gap,
+    GAP_PX, LABEL_GAP_PX, LABEL_TEXT_PX, Plan, SLANT_DEG, TICK_PX, TICK_TEXT_PX, TITLE_TEXT_PX, lines_px,
+    tick_gap,
 };
 use crate::style::Style;
 use crate::svg::{Align, Num, Svg, Type, Weight, area, line_data, stroke};
@@ -36,10 +36,7 @@ impl Plan<'_> {
             colors: self.colors,
         };
         self.grid(svg, &view);
-        self.panel
-            .marks
-            .iter()
-            .for_each(|mark| view.draw(svg, mark));
+        self.panel.marks.iter().for_each(|mark| view.draw(svg, mark));
         self.axis_lines(svg, &view);
         if self.labelled[0] {
             self.x_labels(svg, &view);
@@ -135,10 +132,7 @@ impl Plan<'_> {
 
     fn x_labels(&self, svg: &mut Svg, view: &View) {
         let Frame {
-            left,
-            right,
-            bottom,
-            ..
+            left, right, bottom, ..
         } = view.frame;
         let top = bottom + tick_gap(&self.panel.x);
         let flat = Type::new(TICK_TEXT_PX, Align::Middle);
@@ -156,11 +150,7 @@ impl Plan<'_> {
         }
         let down = self.tick_rooms[0] + LABEL_GAP_PX + RISE * LABEL_TEXT_PX;
         let label = Type::new(LABEL_TEXT_PX, Align::Middle);
-        svg.text(
-            &self.labels[0],
-            [(left + right) / 2.0, bottom + down],
-            label,
-        );
+        svg.text(&self.labels[0], [(left + right) / 2.0, bottom + down], label);
     }
 
     fn y_labels(&self, svg: &mut Svg, view: &View) {
@@ -179,11 +169,7 @@ impl Plan<'_> {
         }
         let width = lines_px(&self.labels[1], LABEL_TEXT_PX) - RISE * LABEL_TEXT_PX;
         let out = self.tick_rooms[1] + LABEL_GAP_PX + width;
-        svg.text(
-            &self.labels[1],
-            [left - out, (top + bottom) / 2.0],
-            upwards(),
-        );
+        svg.text(&self.labels[1], [left - out, (top + bottom) / 2.0], upwards());
     }
 
     fn place_legend(&self, svg: &mut Svg, legend: &Block<'_>, frame: &Frame) {

@@ -68,10 +68,7 @@ impl Axis {
 
     /// An axis of named places 0, 1, 2, ...
     #[must_use]
-    pub fn categories<S: Into<String>>(
-        label: impl Into<String>,
-        names: impl IntoIterator<Item = S>,
-    ) -> Self {
+    pub fn categories<S: Into<String>>(label: impl Into<String>, names: impl IntoIterator<Item = S>) -> Self {
         Self {
             label: label.into(),
             ticks: Ticks::Categories(names.into_iter().map(Into::into).collect()),
@@ -93,9 +90,7 @@ impl Axis {
         }
         match (given, &self.ticks) {
             (Some([low, high]), _) => self.checked(low, high, panel, axis),
-            (None, Ticks::Categories(names)) if !names.is_empty() => {
-                Ok([-0.5, names.len() as f64 - 0.5])
-            }
+            (None, Ticks::Categories(names)) if !names.is_empty() => Ok([-0.5, names.len() as f64 - 0.5]),
             _ if reach.is_empty() => Err(Error::NoValues { panel, axis }),
             _ => {
                 let [low, high] = self.widened(reach);
@@ -104,13 +99,7 @@ impl Axis {
         }
     }
 
-    fn checked(
-        &self,
-        low: f64,
-        high: f64,
-        panel: usize,
-        axis: AxisName,
-    ) -> Result<[f64; 2], Error> {
+    fn checked(&self, low: f64, high: f64, panel: usize, axis: AxisName) -> Result<[f64; 2], Error> {
         if !(low.is_finite() && high.is_finite() && (high - low).is_finite() && low < high) {
             Err(Error::BadRange {
                 panel,
@@ -154,12 +143,7 @@ impl Axis {
     }
 
     /// The ticks with labels: round ones divide the range into no more than these parts, fewer if `clash` says so.
-    pub(crate) fn labelled(
-        &self,
-        range: [f64; 2],
-        parts: f64,
-        clash: impl Fn(&[Tick]) -> bool,
-    ) -> Vec<Tick> {
+    pub(crate) fn labelled(&self, range: [f64; 2], parts: f64, clash: impl Fn(&[Tick]) -> bool) -> Vec<Tick> {
         match &self.ticks {
             Ticks::Hidden => Vec::new(),
             Ticks::Categories(names) => {
@@ -186,10 +170,7 @@ impl Axis {
 }
 
 /// The densest candidate whose labels do not clash; after a few tries, clashing or not.
-fn first_clear(
-    candidates: impl Iterator<Item = Vec<Tick>>,
-    clash: impl Fn(&[Tick]) -> bool,
-) -> Vec<Tick> {
+fn first_clear(candidates: impl Iterator<Item = Vec<Tick>>, clash: impl Fn(&[Tick]) -> bool) -> Vec<Tick> {
     let mut last = Vec::new();
     for ticks in candidates.take(8) {
         if ticks.len() < 2 && last.len() >= 2 {
@@ -310,12 +291,7 @@ mod tests {
 
     #[test]
     fn ranges_must_increase() {
-        for range in [
-            [1.0, 1.0],
-            [2.0, 1.0],
-            [f64::NAN, 1.0],
-            [0.0, f64::INFINITY],
-        ] {
+        for range in [[1.0, 1.0], [2.0, 1.0], [f64::NAN, 1.0], [0.0, f64::INFINITY]] {
             let axis = Axis {
                 range: Some(range),
                 ..Axis::default()

@@ -5,9 +5,7 @@ use crate::axis::{Mapping, Scale};
 use crate::draw::{Colors, LEVELS};
 use crate::figure::Panel;
 use crate::path::Frame;
-use crate::plan::{
-    GAP_PX, LABEL_GAP_PX, LABEL_TEXT_PX, TICK_PX, TICK_TEXT_PX, free_ticks, lines_px,
-};
+use crate::plan::{GAP_PX, LABEL_GAP_PX, LABEL_TEXT_PX, TICK_PX, TICK_TEXT_PX, free_ticks, lines_px};
 use crate::svg::{Align, Num, Svg, Type, area, line_data};
 use crate::text;
 use crate::ticks::Tick;

@@ -73,14 +73,9 @@ impl View {
             Shape::Points(points) => self.points(svg, points, style),
             Shape::Segments(pairs) => self.segments(svg, pairs, style),
             Shape::Arrows(pairs) => self.arrows(svg, pairs, style),
-            Shape::Polygon(points) => {
-                self.outline(svg, self.all(points).filter(is_finite).collect(), style)
-            }
+            Shape::Polygon(points) => self.outline(svg, self.all(points).filter(is_finite).collect(), style),
             Shape::Band(intervals) => self.band(svg, intervals, style),
-            Shape::ErrorBars {
-                intervals,
-                direction,
-            } => self.error_bars(svg, intervals, *direction, style),
+            Shape::ErrorBars { intervals, direction } => self.error_bars(svg, intervals, *direction, style),
             Shape::Bars {
                 bars,
                 width,
@@ -178,8 +173,7 @@ impl View {
         let (sin, cos) = ellipse.angle_rad.sin_cos();
         let ([x, y], [a, b]) = (ellipse.center, ellipse.semi_axes);
         let corner = |index: u32| {
-            let (t_sin, t_cos) =
-                (std::f64::consts::TAU * f64::from(index) / f64::from(CORNERS)).sin_cos();
+            let (t_sin, t_cos) = (std::f64::consts::TAU * f64::from(index) / f64::from(CORNERS)).sin_cos();
             self.px([
                 x + a * t_cos * cos - b * t_sin * sin,
                 y + a * t_cos * sin + b * t_sin * cos,
@@ -197,17 +191,10 @@ impl View {
         }
     }
 
-    fn error_bars(
-        &self,
-        svg: &mut Svg,
-        intervals: &[Interval],
-        direction: Direction,
-        style: &Style,
-    ) {
+    fn error_bars(&self, svg: &mut Svg, intervals: &[Interval], direction: Direction, style: &Style) {
         let mut data = String::new();
         for interval in intervals.iter().filter(|interval| interval.is_finite()) {
-            let ends =
-                [interval.low, interval.high].map(|end| self.oriented(end, interval.at, direction));
+            let ends = [interval.low, interval.high].map(|end| self.oriented(end, interval.at, direction));
             for run in self.frame.cut_line(ends) {
                 line_data(&run, &mut data);
             }
@@ -224,14 +211,7 @@ impl View {
         );
     }
 
-    fn bars(
-        &self,
-        svg: &mut Svg,
-        bars: &[Interval],
-        width: f64,
-        direction: Direction,
-        style: &Style,
-    ) {
+    fn bars(&self, svg: &mut Svg, bars: &[Interval], width: f64, direction: Direction, style: &Style) {
         let mut data = String::new();
         for bar in bars.iter().filter(|bar| bar.is_finite()) {
             let from = self.oriented(bar.low, bar.at - width / 2.0, direction);
@@ -326,10 +306,7 @@ impl View {
                     dash: Dash::Solid,
                     ..*style
                 };
-                svg.path(
-                    &data,
-                    &format!("{} stroke-linecap=\"round\"", stroke(&colored)),
-                );
+                svg.path(&data, &format!("{} stroke-linecap=\"round\"", stroke(&colored)));
             }
             first = last;
         }

@@ -53,9 +53,7 @@ pub enum Error {
         axis: AxisName,
     },
     /// A logarithmic axis meets a value that has no logarithm.
-    #[error(
-        "panel {panel}: the logarithmic {axis} axis cannot show {value}; values must be positive"
-    )]
+    #[error("panel {panel}: the logarithmic {axis} axis cannot show {value}; values must be positive")]
     NotPositive {
         /// The panel's number, from 1.
         panel: usize,
@@ -65,9 +63,7 @@ pub enum Error {
         value: f64,
     },
     /// A range is not finite or does not increase.
-    #[error(
-        "panel {panel}: range [{low}, {high}] of the {axis} axis must be finite and increasing"
-    )]
+    #[error("panel {panel}: range [{low}, {high}] of the {axis} axis must be finite and increasing")]
     BadRange {
         /// The panel's number, from 1.
         panel: usize,

@@ -212,27 +212,17 @@ impl Figure {
 
     /// The ranges of x and y of each panel.
     fn ranges(&self) -> Result<Vec<[[f64; 2]; 2]>, Error> {
-        let [xs, ys] =
-            [(0, AxisName::X), (1, AxisName::Y)].map(|(axis, name)| self.axis_ranges(axis, name));
+        let [xs, ys] = [(0, AxisName::X), (1, AxisName::Y)].map(|(axis, name)| self.axis_ranges(axis, name));
         Ok(xs?.into_iter().zip(ys?).map(|(x, y)| [x, y]).collect())
     }
 
     /// The ranges of one axis of each panel; where it is shared, the first one given or that of all values.
     fn axis_ranges(&self, axis: usize, name: AxisName) -> Result<Vec<[f64; 2]>, Error> {
-        let own: Vec<Reach> = self
-            .panels
-            .iter()
-            .map(|panel| panel.reaches()[axis])
-            .collect();
+        let own: Vec<Reach> = self.panels.iter().map(|panel| panel.reaches()[axis]).collect();
         let shared = self.share.axes()[axis].then(|| {
             let mut all = Reach::NONE;
             own.iter().for_each(|reach| all.join(reach));
-            (
-                self.panels
-                    .iter()
-                    .find_map(|panel| panel.axes()[axis].range),
-                all,
-            )
+            (self.panels.iter().find_map(|panel| panel.axes()[axis].range), all)
         });
         let ranges = self
             .panels
@@ -255,10 +245,7 @@ impl Panel {
             return Err(Error::NotLinear { panel });
         }
         for (index, mark) in self.marks.iter().enumerate() {
-            let (found, expected) = (
-                mark.shape.color_values().len(),
-                mark.shape.color_value_count(),
-            );
+            let (found, expected) = (mark.shape.color_values().len(), mark.shape.color_value_count());
             if found != expected {
                 return Err(Error::Lengths {
                     panel,
@@ -306,9 +293,7 @@ impl Panel {
                 let most = reach.high.abs().max(reach.low.abs()).max(f64::MIN_POSITIVE);
                 [-most, most]
             }
-            (None, ColorMap::Sequential) if reach.low == reach.high => {
-                [reach.low - 0.5, reach.high + 0.5]
-            }
+            (None, ColorMap::Sequential) if reach.low == reach.high => [reach.low - 0.5, reach.high + 0.5],
             (None, ColorMap::Sequential) => [reach.low, reach.high],
         };
         if low.is_finite() && high.is_finite() && low < high {
@@ -452,10 +437,7 @@ mod tests {
     fn coordinates(svg: &str) -> Vec<[f64; 2]> {
         let mut found = Vec::new();
         for element in svg.split('<') {
-            for run in attribute(element, "d")
-                .unwrap_or_default()
-                .split(['M', 'L'])
-            {
+            for run in attribute(element, "d").unwrap_or_default().split(['M', 'L']) {
                 let run = run
                     .split(|letter: char| letter.is_ascii_alphabetic())
                     .next()
@@ -467,9 +449,7 @@ mod tests {
                 found.extend(numbers.chunks_exact(2).map(|pair| [pair[0], pair[1]]));
             }
             if let Some(x) = attribute(element, "x").filter(|_| element.starts_with("text")) {
-                found.push(
-                    [x, attribute(element, "y").unwrap()].map(|number| number.parse().unwrap()),
-                );
+                found.push([x, attribute(element, "y").unwrap()].map(|number| number.parse().unwrap()));
             }
         }
         found
@@ -535,11 +515,7 @@ mod tests {
     #[test]
     fn text_is_escaped_everywhere() {
         let title = "a < b & \"c\"".to_owned();
-        let line = Mark::new(
-            title.clone(),
-            Style::default(),
-            Shape::Line(POINTS.to_vec()),
-        );
+        let line = Mark::new(title.clone(), Style::default(), Shape::Line(POINTS.to_vec()));
         let panels = vec![Panel {
             title: title.clone(),
             marks: vec![line],
@@ -618,10 +594,7 @@ mod tests {
         let good = panel([Shape::Line(POINTS.to_vec())]);
         let error = |figure: Figure| figure.to_svg().unwrap_err();
         assert_eq!(error(Figure::default()), Error::NoTitle);
-        assert_eq!(
-            error(figure(vec![])).to_string(),
-            "figure `test` has no panels"
-        );
+        assert_eq!(error(figure(vec![])).to_string(), "figure `test` has no panels");
         let none = Figure {
             columns: 0,
             ..figure(vec![good.clone()])
@@ -634,10 +607,7 @@ mod tests {
             y: Axis::log("y"),
             ..panel([Shape::Points(vec![[1.0, 1.0], [2.0, 0.0]])])
         };
-        let log = Panel {
-            colors: None,
-            ..log
-        };
+        let log = Panel { colors: None, ..log };
         let expected = Error::NotPositive {
             panel: 1,
             axis: AxisName::Y,

@@ -26,10 +26,7 @@ pub(crate) fn markers(svg: &mut Svg, points: &[Px], style: &Style) {
             dash: Dash::Solid,
             ..*style
         };
-        return svg.path(
-            &data,
-            &format!("{} stroke-linecap=\"round\"", stroke(&disc)),
-        );
+        return svg.path(&data, &format!("{} stroke-linecap=\"round\"", stroke(&disc)));
     }
     points
         .iter()
@@ -59,10 +56,7 @@ fn marker_data(marker: Marker, [x, y]: Px, size_px: f64, data: &mut String) {
             let left = Num(x - size_px / 2.0);
             put(
                 data,
-                format_args!(
-                    "M{left} {}a{r} {r} 0 1 0 {d} 0a{r} {r} 0 1 0 -{d} 0Z",
-                    Num(y)
-                ),
+                format_args!("M{left} {}a{r} {r} 0 1 0 {d} 0a{r} {r} 0 1 0 -{d} 0Z", Num(y)),
             );
         }
         Marker::Cross => rays(data, [x, y], &[[0.8 * r, 0.8 * r], [0.8 * r, -0.8 * r]]),
@@ -84,18 +78,8 @@ fn marker_data(marker: Marker, [x, y]: Px, size_px: f64, data: &mut String) {
             1.2 * r,
             &[[0.0, -1.0], [1.0, 0.0], [0.0, 1.0], [-1.0, 0.0]],
         ),
-        Marker::Triangle => corners(
-            data,
-            [x, y],
-            1.2 * r,
-            &[[0.0, -1.0], [0.9, 0.6], [-0.9, 0.6]],
-        ),
-        Marker::TriangleDown => corners(
-            data,
-            [x, y],
-            1.2 * r,
-            &[[0.0, 1.0], [0.9, -0.6], [-0.9, -0.6]],
-        ),
+        Marker::Triangle => corners(data, [x, y], 1.2 * r, &[[0.0, -1.0], [0.9, 0.6], [-0.9, 0.6]]),
+        Marker::TriangleDown => corners(data, [x, y], 1.2 * r, &[[0.0, 1.0], [0.9, -0.6], [-0.9, -0.6]]),
     }
 }
 
@@ -161,8 +145,7 @@ pub(crate) fn arrow_head(from: Px, to: Px, width_px: f64, data: &mut String) -> 
 }
 
 fn put(data: &mut String, text: std::fmt::Arguments<'_>) {
-    data.write_fmt(text)
-        .expect("writing to a string cannot fail");
+    data.write_fmt(text).expect("writing to a string cannot fail");
 }
 
 /// The colour and opacity inside an outline, if there is any.

@@ -19,9 +19,7 @@ pub(crate) fn draw(figure: &Figure, ranges: &[[[f64; 2]; 2]], colors: &[Option<C
         .panels
         .iter()
         .enumerate()
-        .map(|(index, panel)| {
-            Plan::new(panel, ranges[index], colors[index], labelled(figure, index))
-        })
+        .map(|(index, panel)| Plan::new(panel, ranges[index], colors[index], labelled(figure, index)))
         .collect();
     line_up(&mut plans, figure.columns);
     let (places, grid) = places(&plans, figure.columns);
@@ -65,15 +63,8 @@ fn places(plans: &[Plan<'_>], columns: usize) -> (Vec<Px>, [f64; 2]) {
     let down = plans
         .iter()
         .map(|plan| [plan.margins().top, plan.size[1] + plan.margins().bottom]);
-    let (lefts, width) = tracks(
-        across
-            .enumerate()
-            .map(|(place, room)| (place % columns, room)),
-    );
-    let (tops, height) = tracks(
-        down.enumerate()
-            .map(|(place, room)| (place / columns, room)),
-    );
+    let (lefts, width) = tracks(across.enumerate().map(|(place, room)| (place % columns, room)));
+    let (tops, height) = tracks(down.enumerate().map(|(place, room)| (place / columns, room)));
     let corners = (0..plans.len()).map(|place| [lefts[place % columns], tops[place / columns]]);
     (corners.collect(), [width, height])
 }
@@ -122,10 +113,7 @@ fn page(grid: [f64; 2], places: &[Px], legend: Option<&Block<'_>>, side: Side) -
         (Some(block), Side::Below) => {
             let from = places[0][0];
             let left = from.min((width - block.width).max(EDGE_PX));
-            let at = [
-                left + ((width - left - block.width) / 2.0).max(0.0),
-                height + 9.0,
-            ];
+            let at = [left + ((width - left - block.width) / 2.0).max(0.0), height + 9.0];
             ([width.max(at[0] + block.width), at[1] + block.height], at)
         }
     };

@@ -250,9 +250,7 @@ impl Shape {
             | Self::Points(points)
             | Self::Polygon(points)
             | Self::ColoredLine { points, .. } => {
-                points
-                    .iter()
-                    .for_each(|&point| add_point(&mut reaches, point));
+                points.iter().for_each(|&point| add_point(&mut reaches, point));
             }
             Self::Segments(pairs) | Self::Arrows(pairs) => {
                 pairs
@@ -260,19 +258,14 @@ impl Shape {
                     .flatten()
                     .for_each(|&point| add_point(&mut reaches, point));
             }
-            Self::Notes(notes) => notes
-                .iter()
-                .for_each(|note| add_point(&mut reaches, note.at)),
+            Self::Notes(notes) => notes.iter().for_each(|note| add_point(&mut reaches, note.at)),
             Self::Ellipses(ellipses) => ellipses.iter().for_each(|ellipse| {
                 let ([x, y], [w, h]) = (ellipse.center, ellipse.half_box());
                 add_point(&mut reaches, [x - w, y - h]);
                 add_point(&mut reaches, [x + w, y + h]);
             }),
             Self::Band(intervals) => add_intervals(&mut reaches, intervals, Direction::Vertical),
-            Self::ErrorBars {
-                intervals,
-                direction,
-            } => add_intervals(&mut reaches, intervals, *direction),
+            Self::ErrorBars { intervals, direction } => add_intervals(&mut reaches, intervals, *direction),
             Self::Bars {
                 bars,
                 width,
@@ -286,12 +279,8 @@ impl Shape {
                 between.iter().flatten().for_each(|&value| reach.add(value));
             }
             Self::Cells(grid) => {
-                grid.x_edges
-                    .iter()
-                    .for_each(|&value| reaches[0].add_edge(value));
-                grid.y_edges
-                    .iter()
-                    .for_each(|&value| reaches[1].add_edge(value));
+                grid.x_edges.iter().for_each(|&value| reaches[0].add_edge(value));
+                grid.y_edges.iter().for_each(|&value| reaches[1].add_edge(value));
             }
         }
         reaches
@@ -310,9 +299,7 @@ impl Shape {
     pub(crate) fn color_value_count(&self) -> usize {
         match self {
             Self::ColoredLine { points, .. } => points.len(),
-            Self::Cells(grid) => {
-                grid.x_edges.len().saturating_sub(1) * grid.y_edges.len().saturating_sub(1)
-            }
+            Self::Cells(grid) => grid.x_edges.len().saturating_sub(1) * grid.y_edges.len().saturating_sub(1),
             _ => 0,
         }
     }
@@ -341,8 +328,7 @@ mod tests {
 
     #[test]
     fn points_that_are_not_finite_do_not_count() {
-        let [x, y] =
-            Shape::Line(vec![[0.0, 1.0], GAP, [f64::INFINITY, 9.0], [2.0, -1.0]]).reaches();
+        let [x, y] = Shape::Line(vec![[0.0, 1.0], GAP, [f64::INFINITY, 9.0], [2.0, -1.0]]).reaches();
         assert_eq!([x.low, x.high, y.low, y.high], [0.0, 2.0, -1.0, 1.0]);
     }
 
@@ -355,10 +341,7 @@ mod tests {
         };
         let [x, y] = Shape::Ellipses(vec![ellipse]).reaches();
         for (found, expected) in [(x.low, 0.0), (x.high, 2.0), (y.low, -1.0), (y.high, 5.0)] {
-            assert!(
-                (found - expected).abs() < 1e-12,
-                "{found} is not {expected}"
-            );
+            assert!((found - expected).abs() < 1e-12, "{found} is not {expected}");
         }
     }
 

@@ -33,10 +33,7 @@ impl Frame {
     }
 
     pub(crate) fn clamp(&self, [x, y]: Px) -> Px {
-        [
-            x.clamp(self.left, self.right),
-            y.clamp(self.top, self.bottom),
-        ]
+        [x.clamp(self.left, self.right), y.clamp(self.top, self.bottom)]
     }
 
     /// The part of a segment inside (Liang and Barsky 1984), if there is one.
@@ -91,11 +88,9 @@ impl Frame {
             (1, self.top, 1.0),
             (1, self.bottom, -1.0),
         ];
-        sides
-            .into_iter()
-            .fold(points, |points, (axis, limit, sign)| {
-                cut_side(&points, |point| sign * (point[axis] - limit))
-            })
+        sides.into_iter().fold(points, |points, (axis, limit, sign)| {
+            cut_side(&points, |point| sign * (point[axis] - limit))
+        })
     }
 }
 
@@ -222,9 +217,7 @@ mod tests {
 
     #[test]
     fn points_on_a_straight_line_vanish() {
-        let line: Vec<Px> = (0..100)
-            .map(|i| [f64::from(i), 2.0 * f64::from(i)])
-            .collect();
+        let line: Vec<Px> = (0..100).map(|i| [f64::from(i), 2.0 * f64::from(i)]).collect();
         assert_eq!(thin(&line, 0.1), [line[0], line[99]]);
     }
 

@@ -137,10 +137,7 @@ impl<'a> Plan<'a> {
         let mapping = self.mappings([0.0, 0.0])[0];
         let (mut left, mut right) = (0.0_f64, 6.0_f64);
         for tick in self.ticks[0].iter().filter(|_| self.labelled[0]) {
-            let (px, width) = (
-                mapping.px(tick.at),
-                text::widest_px(&tick.lines, TICK_TEXT_PX),
-            );
+            let (px, width) = (mapping.px(tick.at), text::widest_px(&tick.lines, TICK_TEXT_PX));
             if self.slanted {
                 left = left.max(width * SLANT_DEG.to_radians().cos() + TICK_TEXT_PX - px);
             } else {

@@ -20,10 +20,7 @@ impl fmt::Display for Num {
         if hundredths < 0 {
             f.write_char('-')?;
         }
-        let (whole, part) = (
-            hundredths.unsigned_abs() / 100,
-            hundredths.unsigned_abs() % 100,
-        );
+        let (whole, part) = (hundredths.unsigned_abs() / 100, hundredths.unsigned_abs() % 100);
         match (part, part % 10) {
             (0, _) => write!(f, "{whole}"),
             (_, 0) => write!(f, "{whole}.{}", part / 10),

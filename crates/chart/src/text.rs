@@ -2,13 +2,13 @@
 
 /// Advance widths of the letters a to z in DejaVu Sans, the widest of the usual fonts, in thousandths of the font size.
 const LOWER: [u16; 26] = [
-    613, 635, 550, 635, 615, 352, 635, 634, 278, 278, 579, 278, 974, 634, 612, 635, 635, 411, 521,
-    392, 634, 592, 818, 592, 592, 525,
+    613, 635, 550, 635, 615, 352, 635, 634, 278, 278, 579, 278, 974, 634, 612, 635, 635, 411, 521, 392, 634,
+    592, 818, 592, 592, 525,
 ];
 /// The same for A to Z.
 const UPPER: [u16; 26] = [
-    684, 686, 698, 770, 632, 575, 775, 752, 295, 295, 656, 557, 863, 748, 787, 603, 787, 695, 635,
-    611, 732, 684, 989, 685, 611, 685,
+    684, 686, 698, 770, 632, 575, 775, 752, 295, 295, 656, 557, 863, 748, 787, 603, 787, 695, 635, 611, 732,
+    684, 989, 685, 611, 685,
 ];
 
 /// The distance between lines, in font sizes.
@@ -48,10 +48,7 @@ pub(crate) fn wrap(text: &str, size_px: f64, room_px: f64) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     for word in text.split_whitespace() {
         match lines.last_mut() {
-            Some(line)
-                if width_px(line, size_px) + width_px(word, size_px) + 0.32 * size_px
-                    <= room_px =>
-            {
+            Some(line) if width_px(line, size_px) + width_px(word, size_px) + 0.32 * size_px <= room_px => {
                 line.push(' ');
                 line.push_str(word);
             }

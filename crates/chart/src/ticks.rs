@@ -44,14 +44,8 @@ impl Step {
     /// The next larger step.
     pub(crate) fn next(self) -> Self {
         match self.mantissa {
-            1 => Self {
-                mantissa: 2,
-                ..self
-            },
-            2 => Self {
-                mantissa: 5,
-                ..self
-            },
+            1 => Self { mantissa: 2, ..self },
+            2 => Self { mantissa: 5, ..self },
             _ => Self {
                 mantissa: 1,
                 exponent: self.exponent + 1,
@@ -225,10 +219,7 @@ mod tests {
     fn linear_ticks_are_exact_multiples() {
         let ticks = linear([-0.1, 0.52], 7.0).next().unwrap();
         assert_eq!(at(&ticks), [-0.1, 0.0, 0.1, 0.2, 0.3, 0.4, 0.5]);
-        assert_eq!(
-            labels(&ticks),
-            ["−0.1", "0.0", "0.1", "0.2", "0.3", "0.4", "0.5"]
-        );
+        assert_eq!(labels(&ticks), ["−0.1", "0.0", "0.1", "0.2", "0.3", "0.4", "0.5"]);
         assert_eq!(
             at(&linear([0.0, 100.0], 5.0).next().unwrap()),
             [0.0, 20.0, 40.0, 60.0, 80.0, 100.0]

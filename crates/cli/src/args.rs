@@ -102,7 +102,12 @@ const SEEDS: u32 = 40;
 
 impl Default for Reproduce {
     fn default() -> Self {
-        Self { measured: Vec::new(), out: None, seeds: SEEDS, json: false }
+        Self {
+            measured: Vec::new(),
+            out: None,
+            seeds: SEEDS,
+            json: false,
+        }
     }
 }
 
@@ -125,6 +130,9 @@ pub(crate) struct Drive {
     /// Force a way of casting rays
     #[arg(long, value_name = "NAME", value_parser = ["brute", "bvh", "cells", "tree"])]
     pub(crate) caster: Option<String>,
+    /// Name of the data set [default: the controller and a hash of the configuration]
+    #[arg(long)]
+    pub(crate) name: Option<String>,
     /// Folder for the data set
     #[arg(long, value_name = "DIR")]
     pub(crate) out: PathBuf,
@@ -215,7 +223,13 @@ pub(crate) enum World {
         /// World file, or the name of a shipped world
         world: PathBuf,
         /// Maximal distances of a segment from the exact wall, m
-        #[arg(long, required = true, value_delimiter = ',', value_name = "M,...", allow_negative_numbers = true)]
+        #[arg(
+            long,
+            required = true,
+            value_delimiter = ',',
+            value_name = "M,...",
+            allow_negative_numbers = true
+        )]
         max_error: Vec<f64>,
         /// Print one JSON document
         #[arg(long)]
@@ -287,7 +301,12 @@ pub(crate) enum Bench {
     /// machine alone while it measures.
     Rays {
         /// Numbers of segments; the circuit is cut as finely as they need
-        #[arg(long, value_delimiter = ',', default_value = "15,33,47,105,1000,10000,100000", value_name = "N,...")]
+        #[arg(
+            long,
+            value_delimiter = ',',
+            default_value = "15,33,47,105,1000,10000,100000",
+            value_name = "N,..."
+        )]
         segments: Vec<usize>,
         /// Draws behind every interval of faithfulness
         #[arg(long, default_value_t = 20, value_name = "N", value_parser = clap::value_parser!(u32).range(2..))]

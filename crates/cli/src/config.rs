@@ -245,11 +245,8 @@ impl Config {
 
     /// All keys, `effect` too where there is none, so that it is known to be an array.
     fn to_table(&self) -> Table {
-        let mut table =
-            Table::try_from(self).expect("every field of a configuration has a form in TOML");
-        table
-            .entry("effect")
-            .or_insert_with(|| Value::Array(Vec::new()));
+        let mut table = Table::try_from(self).expect("every field of a configuration has a form in TOML");
+        table.entry("effect").or_insert_with(|| Value::Array(Vec::new()));
         table
     }
 }

@@ -107,7 +107,8 @@ impl DataSet {
 
     /// Whether these are laps that are shipped with this program.
     pub(crate) fn is_shipped(&self) -> bool {
-        self.controller.is_some_and(|controller| Source::Shipped(Shipped::of(controller)).folder() == self.folder)
+        self.controller
+            .is_some_and(|controller| Source::Shipped(Shipped::of(controller)).folder() == self.folder)
     }
 
     fn from_source(source: Source<'_>) -> Result<Self> {

@@ -81,10 +81,7 @@ mod tests {
         assert_eq!(flag.check(Interrupted::Dropped), Ok(()));
         assert!(!flag.raise());
         let error = flag.check(Interrupted::Resumable).unwrap_err();
-        assert_eq!(
-            error.to_string(),
-            "interrupted: run again with --resume to go on"
-        );
+        assert_eq!(error.to_string(), "interrupted: run again with --resume to go on");
         assert!(flag.raise());
     }
 
@@ -92,9 +89,6 @@ mod tests {
     fn an_interrupt_is_found_under_its_context() {
         let error = anyhow::Error::from(Interrupted::Dropped).context("run a");
         assert!(error.is::<Interrupted>());
-        assert_eq!(
-            format!("{error:#}"),
-            "run a: interrupted: nothing was written"
-        );
+        assert_eq!(format!("{error:#}"), "run a: interrupted: nothing was written");
     }
 }

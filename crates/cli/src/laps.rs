@@ -81,8 +81,17 @@ impl SampledRun {
             .map(|(lap, gate)| format!("{}: lap {lap} misses gate {gate} and is set aside", self.name))
             .collect();
         if self.laps.len() < self.wanted {
-            let ending = if self.timed_out { " (the run timed out)" } else { "" };
-            remarks.push(format!("{}: {} of {} laps{ending}", self.name, self.laps.len(), self.wanted));
+            let ending = if self.timed_out {
+                " (the run timed out)"
+            } else {
+                ""
+            };
+            remarks.push(format!(
+                "{}: {} of {} laps{ending}",
+                self.name,
+                self.laps.len(),
+                self.wanted
+            ));
         }
         remarks
     }
@@ -114,7 +123,11 @@ impl Measured {
     pub(crate) fn on(set: DataSet, circuit: Arc<Circuit>) -> Result<Self> {
         let config = set.declared_config(&Config::shipped())?;
         let way = setup::way(&config, &circuit.course);
-        let runs = set.runs.par_iter().map(|run| sample(&set, run, &circuit, way)).collect::<Result<_>>()?;
+        let runs = set
+            .runs
+            .par_iter()
+            .map(|run| sample(&set, run, &circuit, way))
+            .collect::<Result<_>>()?;
         Ok(Self { set, circuit, runs })
     }
 
@@ -128,19 +141,33 @@ impl Measured {
         let lap = &self.runs[run].laps[lap];
         let rows = &self.set.runs[run].rows;
         let inside = |t: f64| t >= lap.start_s - 1e-9 && t <= lap.end_s + 1e-9;
-        rows.t_s.iter().zip(&rows.position_m).filter(|(t, _)| inside(**t)).filter_map(|(_, p)| *p).collect()
+        rows.t_s
+            .iter()
+            .zip(&rows.position_m)
+            .filter(|(t, _)| inside(**t))
+            .filter_map(|(_, p)| *p)
+            .collect()
     }
 }
 
 fn sample(set: &DataSet, run: &RunFile, circuit: &Circuit, way: Way) -> Result<SampledRun> {
     let mut tracker = LapTracker::new(&circuit.gates, way);
-    let seen = run.rows.t_s.iter().zip(&run.rows.position_m).filter_map(|(t, p)| p.map(|p| (*t, p)));
-    let whole: Vec<Lap> = seen.filter_map(|(t, [x, y])| tracker.push(t, Vec2::new(x, y))).collect();
+    let seen = run
+        .rows
+        .t_s
+        .iter()
+        .zip(&run.rows.position_m)
+        .filter_map(|(t, p)| p.map(|p| (*t, p)));
+    let whole: Vec<Lap> = seen
+        .filter_map(|(t, [x, y])| tracker.push(t, Vec2::new(x, y)))
+        .collect();
     let sampled = SampledRun::new(&set.name, &run.name, &whole, set.laps);
     if sampled.laps.is_empty() {
         let path = run.path.display();
         if let Some((lap, gate)) = sampled.set_aside.first() {
-            bail!("{path}: no lap crosses all gates: lap {lap} misses gate {gate}; is this the world it was driven in?");
+            bail!(
+                "{path}: no lap crosses all gates: lap {lap} misses gate {gate}; is this the world it was driven in?"
+            );
         }
         bail!(
             "{path}: {} whole laps, and the first is not analysed: at least two are needed; check the world, the \
@@ -155,11 +182,24 @@ fn sample(set: &DataSet, run: &RunFile, circuit: &Circuit, way: Way) -> Result<S
 ///
 /// # Errors
 /// What the simulator refuses.
-pub(crate) fn simulate(setup: &Setup, name: &str, seed: u64, runs: usize, laps: usize) -> Result<Vec<SampledRun>> {
+pub(crate) fn simulate(
+    setup: &Setup,
+    name: &str,
+    seed: u64,
+    runs: usize,
+    laps: usize,
+) -> Result<Vec<SampledRun>> {
     (0..runs)
         .into_par_iter()
         .map(|run| {
-            let drive = setup.drive(Streams { seed, run: run as u64 }, laps, |_| {})?;
+            let drive = setup.drive(
+                Streams {
+                    seed,
+                    run: run as u64,
+                },
+                laps,
+                |_| {},
+            )?;
             Ok(simulated(name, run, &drive, laps))
         })
         .collect()
@@ -168,9 +208,18 @@ pub(crate) fn simulate(setup: &Setup, name: &str, seed: u64, runs: usize, laps: 
 /// The sampled laps of a simulated run.
 pub(crate) fn simulated(name: &str, run: usize, drive: &Drive, wanted: usize) -> SampledRun {
     // The simulator has dropped the first lap already; any lap stands in its place here.
-    let whole: Vec<Lap> = drive.laps.first().into_iter().chain(&drive.laps).cloned().collect();
+    let whole: Vec<Lap> = drive
+        .laps
+        .first()
+        .into_iter()
+        .chain(&drive.laps)
+        .cloned()
+        .collect();
     let sampled = SampledRun::new(name, &crate::dataset::run_name(run), &whole, wanted);
-    SampledRun { timed_out: drive.timed_out, ..sampled }
+    SampledRun {
+        timed_out: drive.timed_out,
+        ..sampled
+    }
 }
 
 /// Mean and standard deviation (divisor n - 1).

@@ -42,10 +42,15 @@ fn main() -> ExitCode {
 fn run(cli: Cli) -> Result<()> {
     interrupt::install()?;
     if let Some(threads) = cli.global.threads {
-        rayon::ThreadPoolBuilder::new().num_threads(threads.into()).build_global()?;
+        rayon::ThreadPoolBuilder::new()
+            .num_threads(threads.into())
+            .build_global()?;
     }
     let session = Session::new(cli.global);
-    match cli.command.unwrap_or_else(|| Command::Reproduce(Reproduce::default())) {
+    match cli
+        .command
+        .unwrap_or_else(|| Command::Reproduce(Reproduce::default()))
+    {
         Command::Reproduce(args) => commands::reproduce::run(&session, &args),
         Command::Drive(args) => commands::drive::run(&session, &args),
         Command::Compare(args) => commands::compare::run(&session, &args),

@@ -67,8 +67,7 @@ impl OutDir {
         if resumed {
             refuse_other_work(&partial, work)?;
         } else if there {
-            fs::remove_dir_all(&partial)
-                .with_context(|| format!("cannot remove {}", partial.display()))?;
+            fs::remove_dir_all(&partial).with_context(|| format!("cannot remove {}", partial.display()))?;
         }
         let marker = match lock {
             Some(lock) if resumed => lock,
@@ -191,10 +190,7 @@ impl Drop for OutDir {
 
 fn beside(dir: &Path, ending: &str) -> Result<PathBuf> {
     let Some(name) = dir.file_name() else {
-        bail!(
-            "{} cannot be an output folder; name a new one",
-            dir.display()
-        );
+        bail!("{} cannot be an output folder; name a new one", dir.display());
     };
     let mut name = OsString::from(name);
     name.push(ending);
@@ -283,7 +279,9 @@ fn start(partial: &Path, work: &Work) -> Result<File> {
     let marker = File::create(partial.join(MARKER)).map_err(cannot)?;
     let mut marker = lock(marker, partial)?;
     let json = serde_json::to_vec(work).expect("two strings have a form in JSON");
-    let written = marker.write_all(&json).map_err(|error| unwritable(partial, &error));
+    let written = marker
+        .write_all(&json)
+        .map_err(|error| unwritable(partial, &error));
     if written.is_err() {
         let _ = fs::remove_dir_all(partial); // the error to report is the first one
     }

@@ -42,21 +42,34 @@ pub(crate) struct Row {
 
 /// The casters that are compared.
 fn casters() -> [(&'static str, Option<CasterKind>); 3] {
-    [("brute", Some(CasterKind::Brute)), ("bvh", Some(CasterKind::Bvh)), (CHOSEN, None)]
+    [
+        ("brute", Some(CasterKind::Brute)),
+        ("bvh", Some(CasterKind::Bvh)),
+        (CHOSEN, None),
+    ]
 }
 
 /// Measures casters against numbers of segments on a circuit; each tick is one of three casters at one number.
 ///
 /// # Errors
 /// A number of segments that the circuit cannot be cut into.
-pub(crate) fn measure(config: &Config, circuit: &Arc<Circuit>, segments: &[usize], tick: &dyn Fn()) -> Result<Vec<Row>> {
+pub(crate) fn measure(
+    config: &Config,
+    circuit: &Arc<Circuit>,
+    segments: &[usize],
+    tick: &dyn Fn(),
+) -> Result<Vec<Row>> {
     let poses = driven_poses(config, circuit)?;
     let row = |&wanted: &usize| {
         let max_error_m = max_error_for(&circuit.course, wanted)?;
         let mut config = config.clone();
         config.wall.max_error_m = max_error_m;
-        let mut row =
-            Row { segments: 0, max_error_m, ns_per_reading: BTreeMap::new(), ns_per_step: BTreeMap::new() };
+        let mut row = Row {
+            segments: 0,
+            max_error_m,
+            ns_per_reading: BTreeMap::new(),
+            ns_per_step: BTreeMap::new(),
+        };
         for (name, kind) in casters() {
             interrupt::check()?;
             let setup = Setup::new(&config, Arc::clone(circuit), kind)?;
@@ -101,7 +114,10 @@ fn quickest_ns(most: usize, mut work: impl FnMut(usize)) -> f64 {
 fn reading_ns(setup: &Setup, poses: &[Pose]) -> f64 {
     let mounts = &setup.model.machine.mounts;
     let body = Rays::new(mounts.map(|m| (m.position, Vec2::new(m.angle_rad.cos(), m.angle_rad.sin()))));
-    let looks: Vec<(Vec2, Rays)> = poses.iter().map(|pose| (pose.position, body.placed(*pose))).collect();
+    let looks: Vec<(Vec2, Rays)> = poses
+        .iter()
+        .map(|pose| (pose.position, body.placed(*pose)))
+        .collect();
     let (caster, walls): (&Caster, &Walls) = (setup.scene.caster(), setup.scene.walls());
     quickest_ns(20 * looks.len(), |units| {
         for (center, rays) in looks.iter().cycle().take(units) {
@@ -133,12 +149,18 @@ pub(crate) fn cone_cost(config: &Config, circuit: &Arc<Circuit>) -> Result<Vec<(
             .with("sensor.combine", combine)?;
         step_ns(&Setup::new(&config, Arc::clone(circuit), None)?)
     };
-    [1, 3, 10, 30, 100].into_iter().map(|rays| Ok((rays, [step(rays, "responses")?, step(rays, "distances")?]))).collect()
+    [1, 3, 10, 30, 100]
+        .into_iter()
+        .map(|rays| Ok((rays, [step(rays, "responses")?, step(rays, "distances")?])))
+        .collect()
 }
 
 /// Slope and intercept of cost against segments, ns; the slope of its logarithm against that of the segments.
 fn slopes(rows: &[Row], name: &str) -> Value {
-    let points: Vec<(f64, f64)> = rows.iter().map(|row| (row.segments as f64, row.ns_per_reading[name])).collect();
+    let points: Vec<(f64, f64)> = rows
+        .iter()
+        .map(|row| (row.segments as f64, row.ns_per_reading[name]))
+        .collect();
     let (slope, intercept) = weighted_line(&points);
     let logs: Vec<(f64, f64)> = points.iter().map(|(n, t)| (n.ln(), t.ln())).collect();
     let tenfold: Vec<(f64, f64)> = points.iter().map(|(n, t)| (n.log10(), *t)).collect();
@@ -160,7 +182,10 @@ fn weighted_line(points: &[(f64, f64)]) -> (f64, f64) {
 
 fn line(points: &[(f64, f64)]) -> (f64, f64) {
     let n = points.len() as f64;
-    let (mx, my) = (points.iter().map(|p| p.0).sum::<f64>() / n, points.iter().map(|p| p.1).sum::<f64>() / n);
+    let (mx, my) = (
+        points.iter().map(|p| p.0).sum::<f64>() / n,
+        points.iter().map(|p| p.1).sum::<f64>() / n,
+    );
     let sxy: f64 = points.iter().map(|p| (p.0 - mx) * (p.1 - my)).sum();
     let sxx: f64 = points.iter().map(|p| (p.0 - mx) * (p.0 - mx)).sum();
     (sxy / sxx, my - sxy / sxx * mx)
@@ -175,10 +200,12 @@ pub(crate) fn document(rows: &[Row], cone: &[(usize, [f64; 2])]) -> Value {
         })
     };
     let fitted = casters().map(|(name, _)| (name.to_owned(), slopes(rows, name)));
-    let slopes = if rows.len() > 1 { Value::Object(fitted.into_iter().collect()) } else { json!({}) };
-    let ray = |(rays, [responses, distances]): &(usize, [f64; 2])| {
-        json!({ "rays_per_sensor": rays, "ns_per_step": { "responses": responses, "distances": distances } })
+    let slopes = if rows.len() > 1 {
+        Value::Object(fitted.into_iter().collect())
+    } else {
+        json!({})
     };
+    let ray = |(rays, [responses, distances]): &(usize, [f64; 2])| json!({ "rays_per_sensor": rays, "ns_per_step": { "responses": responses, "distances": distances } });
     json!({
         "rows": rows.iter().map(row).collect::<Vec<_>>(),
         "slopes": slopes,
@@ -194,8 +221,14 @@ pub(crate) fn cost_panel(rows: &[Row]) -> Panel {
             "bvh" => "BVH of parry2d",
             _ => "lapwing",
         };
-        let points: Vec<[f64; 2]> = rows.iter().map(|row| [row.segments as f64, row.ns_per_reading[name]]).collect();
-        [Mark::new(label, Style::series(i), Shape::Line(points.clone())), Mark::new(label, Style::series(i), Shape::Points(points))]
+        let points: Vec<[f64; 2]> = rows
+            .iter()
+            .map(|row| [row.segments as f64, row.ns_per_reading[name]])
+            .collect();
+        [
+            Mark::new(label, Style::series(i), Shape::Line(points.clone())),
+            Mark::new(label, Style::series(i), Shape::Points(points)),
+        ]
     };
     Panel {
         x: Axis::log("straight segments"),
@@ -235,44 +268,81 @@ pub(crate) fn ladder(
         let mut config = config.clone();
         config.wall.max_error_m = max_error_m;
         // Too coarse a cut has no closed wall left, or one that shuts the robot out: there the ladder ends.
-        let Ok(setup) = Setup::new(&config, Arc::clone(circuit), None) else { break };
+        let Ok(setup) = Setup::new(&config, Arc::clone(circuit), None) else {
+            break;
+        };
         setups.push(setup);
     }
-    let jobs: Vec<(usize, u64)> = (0..setups.len()).flat_map(|i| (0..draws as u64).map(move |d| (i, d))).collect();
+    let jobs: Vec<(usize, u64)> = (0..setups.len())
+        .flat_map(|i| (0..draws as u64).map(move |d| (i, d)))
+        .collect();
     let driven = jobs.par_iter().map(|&(i, draw)| {
         interrupt::check()?;
-        let drive = setups[i].drive(Streams { seed, run: 1000 + draw * LADDER_M.len() as u64 + i as u64 }, wanted, |_| {})?;
+        let drive = setups[i].drive(
+            Streams {
+                seed,
+                run: 1000 + draw * LADDER_M.len() as u64 + i as u64,
+            },
+            wanted,
+            |_| {},
+        )?;
         Ok(laps::simulated(&format!("{i}"), 0, &drive, wanted))
     });
     let driven: Vec<laps::SampledRun> = driven.collect::<Result<_>>()?;
     let whole = |i: usize| (0..draws).all(|d| driven[i * draws + d].laps.len() == wanted);
     let usable: Vec<usize> = (0..setups.len()).filter(|&i| whole(i)).collect();
     let clusters: Vec<Vec<Cluster>> = (0..draws)
-        .map(|d| usable.iter().map(|&i| driven[i * draws + d].cluster()).collect::<Result<_>>())
+        .map(|d| {
+            usable
+                .iter()
+                .map(|&i| driven[i * draws + d].cluster())
+                .collect::<Result<_>>()
+        })
         .collect::<Result<_>>()?;
-    let together: Vec<Vec<&Cluster>> = clusters.iter().map(|simulated| real.iter().chain(simulated).collect()).collect();
+    let together: Vec<Vec<&Cluster>> = clusters
+        .iter()
+        .map(|simulated| real.iter().chain(simulated).collect())
+        .collect();
     let comparison = Comparison::new(&together)?;
     let mut rungs = Vec::with_capacity(setups.len());
     for (i, setup) in setups.iter().enumerate() {
         let place = usable.iter().position(|&u| u == i);
         let distance = place.map(|place| {
             comparison.estimate(|draw| {
-                (0..real.len()).map(|r| draw.distance(r, real.len() + place)).sum::<f64>() / real.len() as f64
+                (0..real.len())
+                    .map(|r| draw.distance(r, real.len() + place))
+                    .sum::<f64>()
+                    / real.len() as f64
             })
         });
         let (max_error_m, segments) = (LADDER_M[i], setup.scene.walls().len());
-        rungs.push(Rung { max_error_m, segments, distance, ns_per_step: step_ns(setup)? });
+        rungs.push(Rung {
+            max_error_m,
+            segments,
+            distance,
+            ns_per_step: step_ns(setup)?,
+        });
     }
     Ok(rungs)
 }
 
 /// Distance to the measured laps against the cost of a control step, each point with the interval of the draws.
 pub(crate) fn ladder_panel(rungs: &[Rung]) -> Panel {
-    let known: Vec<(&Rung, Estimate)> = rungs.iter().filter_map(|rung| rung.distance.map(|d| (rung, d))).collect();
+    let known: Vec<(&Rung, Estimate)> = rungs
+        .iter()
+        .filter_map(|rung| rung.distance.map(|d| (rung, d)))
+        .collect();
     let at = |rung: &Rung| rung.ns_per_step / 1000.0;
     let style = Style::series(2);
     let points = known.iter().map(|(rung, d)| [at(rung), d.mean]).collect();
-    let intervals = known.iter().map(|(rung, d)| Interval { at: at(rung), low: d.low, high: d.high }).collect();
+    let intervals = known
+        .iter()
+        .map(|(rung, d)| Interval {
+            at: at(rung),
+            low: d.low,
+            high: d.high,
+        })
+        .collect();
     let notes = known.iter().map(|(rung, d)| chart::Note {
         at: [at(rung), d.high],
         text: format!("{} mm", 1000.0 * rung.max_error_m),
@@ -282,9 +352,23 @@ pub(crate) fn ladder_panel(rungs: &[Rung]) -> Panel {
         x: Axis::linear("a control step, µs"),
         y: Axis::log("distance to the measured runs (eq. 8)"),
         marks: vec![
-            Mark::new("walls within so many mm", style, Shape::ErrorBars { intervals, direction: chart::Direction::Vertical }),
+            Mark::new(
+                "walls within so many mm",
+                style,
+                Shape::ErrorBars {
+                    intervals,
+                    direction: chart::Direction::Vertical,
+                },
+            ),
             Mark::new("walls within so many mm", style, Shape::Points(points)),
-            Mark::new("", Style { text_px: 10.0, ..Style::color(chart::Color::GREY) }, Shape::Notes(notes.collect())),
+            Mark::new(
+                "",
+                Style {
+                    text_px: 10.0,
+                    ..Style::color(chart::Color::GREY)
+                },
+                Shape::Notes(notes.collect()),
+            ),
         ],
         ..Panel::default()
     }
@@ -293,15 +377,25 @@ pub(crate) fn ladder_panel(rungs: &[Rung]) -> Panel {
 /// The coarsest walls that are no less faithful than the finest: their mean distance lies within the finest's interval or below.
 pub(crate) fn coarsest_faithful(rungs: &[Rung]) -> Option<&Rung> {
     let finest = rungs.iter().find_map(|rung| rung.distance)?;
-    rungs.iter().rev().find(|rung| rung.distance.is_some_and(|d| d.mean <= finest.high))
+    rungs
+        .iter()
+        .rev()
+        .find(|rung| rung.distance.is_some_and(|d| d.mean <= finest.high))
 }
 
 /// The ladder without what a clock measured.
 pub(crate) fn ladder_table(rungs: &[Rung]) -> Table {
-    let mut table = Table::new("Faithfulness of a ladder of wall errors", &["maximal error, mm", "segments", "distance to the measured runs"]);
+    let mut table = Table::new(
+        "Faithfulness of a ladder of wall errors",
+        &["maximal error, mm", "segments", "distance to the measured runs"],
+    );
     for rung in rungs {
         let distance = rung.distance.map_or("too few laps".into(), |d| d.text(2));
-        table.push([format!("{}", 1000.0 * rung.max_error_m), rung.segments.to_string(), distance]);
+        table.push([
+            format!("{}", 1000.0 * rung.max_error_m),
+            rung.segments.to_string(),
+            distance,
+        ]);
     }
     table
 }
@@ -339,7 +433,10 @@ pub(crate) fn section(rungs: &[Rung], draws: usize) -> Section {
         heading: "What ray casting costs".into(),
         blocks: vec![
             Block::Text(text),
-            Block::Linked { path: PICTURE.into(), caption: caption.into() },
+            Block::Linked {
+                path: PICTURE.into(),
+                caption: caption.into(),
+            },
             Block::Table(ladder_table(rungs)),
         ],
     }

@@ -19,7 +19,10 @@ pub(crate) struct Session {
 
 impl Session {
     pub(crate) fn new(global: Global) -> Self {
-        Self { global, begun: Instant::now() }
+        Self {
+            global,
+            begun: Instant::now(),
+        }
     }
 
     pub(crate) fn seed(&self) -> u64 {

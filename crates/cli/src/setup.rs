@@ -5,14 +5,16 @@ use std::sync::Arc;
 
 use anyhow::{Context, Result, anyhow};
 use sim::{
-    Beam, CasterKind, Circuit, Drive, Machine, Model, Mount, Pattern, ReadingNoise, Response, Robot, RunRules, Scene,
-    Setting, Step, Streams, Vec2, WallRules,
+    Beam, CasterKind, Circuit, Drive, Machine, Model, Mount, Pattern, ReadingNoise, Response, Robot,
+    RunRules, Scene, Setting, Step, Streams, Vec2, WallRules,
 };
 use toml::Value;
 use track::{Course, Way};
 
 use crate::args::ModelArgs;
-use crate::config::{self, Combine, Config, ControllerKind, Direction, ModelFile, ModelSource, SensorKind, WorldSource};
+use crate::config::{
+    self, Combine, Config, ControllerKind, Direction, ModelFile, ModelSource, SensorKind, WorldSource,
+};
 
 /// A checked model on its circuit, ready to drive.
 #[derive(Debug, Clone)]
@@ -62,7 +64,10 @@ pub(crate) fn blamed(error: &sim::Error) -> Vec<&str> {
 
 /// An error of the simulator with the place in the file where its key was set, or else the world.
 pub(crate) fn locate(file: &ModelFile, world: &WorldSource, error: sim::Error) -> anyhow::Error {
-    match error.key().or_else(|| blamed(&error).into_iter().find(|key| file.names(key))) {
+    match error
+        .key()
+        .or_else(|| blamed(&error).into_iter().find(|key| file.names(key)))
+    {
         Some(key) => file.located(key, &error),
         None => anyhow!("{}: {error}", world.label),
     }
@@ -113,24 +118,59 @@ pub(crate) fn model(config: &Config, circuit: &Circuit) -> Result<Model, sim::Er
             start_heading_rad: config.run.start_heading_rad,
             patience_laps: config.run.patience_laps,
         },
-        wall: WallRules { max_error_m: config.wall.max_error_m, thickness_m: config.wall.thickness_m },
-        effects: config.effect.iter().enumerate().map(|(i, e)| setting(i, e)).collect::<Result<_, _>>()?,
+        wall: WallRules {
+            max_error_m: config.wall.max_error_m,
+            thickness_m: config.wall.thickness_m,
+        },
+        effects: config
+            .effect
+            .iter()
+            .enumerate()
+            .map(|(i, e)| setting(i, e))
+            .collect::<Result<_, _>>()?,
     };
     model.check()?;
     Ok(model)
 }
 
 fn machine(config: &Config) -> Result<Machine, sim::Error> {
-    let config::Config { robot, sensor, controller, .. } = config;
-    let mount = |m: config::Mount| Mount { position: Vec2::new(m.x_m, m.y_m), angle_rad: m.angle_rad };
+    let config::Config {
+        robot,
+        sensor,
+        controller,
+        ..
+    } = config;
+    let mount = |m: config::Mount| Mount {
+        position: Vec2::new(m.x_m, m.y_m),
+        angle_rad: m.angle_rad,
+    };
     let (response, noise) = match sensor.kind {
         SensorKind::Improved => {
-            let config::Improved { a_counts, d0_m, exponent, noise_fraction, noise_counts } = sensor.improved;
-            let noise = ReadingNoise { fraction: noise_fraction, counts: noise_counts };
-            (Response::Improved { a_counts, d0_m, exponent }, noise)
+            let config::Improved {
+                a_counts,
+                d0_m,
+                exponent,
+                noise_fraction,
+                noise_counts,
+            } = sensor.improved;
+            let noise = ReadingNoise {
+                fraction: noise_fraction,
+                counts: noise_counts,
+            };
+            (
+                Response::Improved {
+                    a_counts,
+                    d0_m,
+                    exponent,
+                },
+                noise,
+            )
         }
         SensorKind::Original => {
-            let noise = ReadingNoise { fraction: sensor.original.noise_fraction, counts: 0.0 };
+            let noise = ReadingNoise {
+                fraction: sensor.original.noise_fraction,
+                counts: 0.0,
+            };
             (Response::Table(sensor.original.table.clone()), noise)
         }
     };
@@ -167,7 +207,10 @@ fn machine(config: &Config) -> Result<Machine, sim::Error> {
 
 /// One `[[effect]]` table; `index` is its place in the file.
 fn setting(index: usize, effect: &config::Effect) -> Result<Setting, sim::Error> {
-    let invalid = |key: &str, reason: String| sim::Error::Invalid { key: format!("effect.{index}.{key}"), reason };
+    let invalid = |key: &str, reason: String| sim::Error::Invalid {
+        key: format!("effect.{index}.{key}"),
+        reason,
+    };
     let spec = sim::find(&effect.kind).map_err(|error| invalid("kind", error.to_string()))?;
     let by_time = effect.by == Some(config::Pattern::Time);
     let slope_key = |param: &sim::Param| format!("{}_per_s", param.name);
@@ -175,11 +218,15 @@ fn setting(index: usize, effect: &config::Effect) -> Result<Setting, sim::Error>
         let known = |p: &sim::Param| p.name == key || by_time && slope_key(p) == *key;
         if !spec.params.iter().any(known) {
             let names: Vec<&str> = spec.params.iter().map(|p| p.name).collect();
-            return Err(invalid(key, format!("is no parameter of {}, which has {}", spec.name, names.join(", "))));
+            return Err(invalid(
+                key,
+                format!("is no parameter of {}, which has {}", spec.name, names.join(", ")),
+            ));
         }
     }
     let value = |param: &sim::Param, value: &Value| {
-        number(param, value).map_err(|expected| invalid(param.name, format!("{value} given, {expected} expected")))
+        number(param, value)
+            .map_err(|expected| invalid(param.name, format!("{value} given, {expected} expected")))
     };
     let get = |param: &sim::Param| match (effect.parameters.get(param.name), param.neutral) {
         (Some(given), _) => Ok(given.clone()),
@@ -187,19 +234,35 @@ fn setting(index: usize, effect: &config::Effect) -> Result<Setting, sim::Error>
         (None, None) => Err(invalid("kind", format!("{} needs `{}`", spec.name, param.name))),
     };
     let pattern = match effect.by {
-        None => Pattern::Constant(spec.params.iter().map(|p| value(p, &get(p)?)).collect::<Result<_, _>>()?),
+        None => Pattern::Constant(
+            spec.params
+                .iter()
+                .map(|p| value(p, &get(p)?))
+                .collect::<Result<_, _>>()?,
+        ),
         Some(config::Pattern::Time) => Pattern::ByTime {
-            start: spec.params.iter().map(|p| value(p, &get(p)?)).collect::<Result<_, _>>()?,
+            start: spec
+                .params
+                .iter()
+                .map(|p| value(p, &get(p)?))
+                .collect::<Result<_, _>>()?,
             per_s: spec
                 .params
                 .iter()
-                .map(|p| effect.parameters.get(&slope_key(p)).map_or(Ok(0.0), |v| value(p, v)))
+                .map(|p| {
+                    effect
+                        .parameters
+                        .get(&slope_key(p))
+                        .map_or(Ok(0.0), |v| value(p, v))
+                })
                 .collect::<Result<_, _>>()?,
         },
         Some(config::Pattern::Run) => {
             let given: Vec<Value> = spec.params.iter().map(get).collect::<Result<_, _>>()?;
             let lengths = given.iter().filter_map(|v| v.as_array().map(Vec::len));
-            let runs = lengths.max().ok_or_else(|| invalid("by", "by run needs an array of values".into()))?;
+            let runs = lengths
+                .max()
+                .ok_or_else(|| invalid("by", "by run needs an array of values".into()))?;
             let of_run = |run: usize| -> Result<Vec<f64>, sim::Error> {
                 spec.params
                     .iter()
@@ -237,8 +300,15 @@ fn number(param: &sim::Param, value: &Value) -> Result<f64, String> {
 
 /// The model file of a command: the shipped one where its name is given and no such file is there.
 pub(crate) fn model_file(args: &ModelArgs) -> Result<ModelFile> {
-    let shipped = config::WORLDS.iter().any(|(name, _)| args.model == Path::new(name)) && !args.model.exists();
-    let source = if shipped { ModelSource::Embedded } else { ModelSource::Path(&args.model) };
+    let shipped = config::WORLDS
+        .iter()
+        .any(|(name, _)| args.model == Path::new(name))
+        && !args.model.exists();
+    let source = if shipped {
+        ModelSource::Embedded
+    } else {
+        ModelSource::Path(&args.model)
+    };
     ModelFile::load(source, &args.settings.set)
 }
 
@@ -252,21 +322,38 @@ pub(crate) fn effect_table(setting: &Setting) -> config::Effect {
     let mut parameters = toml::Table::new();
     let by = match &setting.pattern {
         Pattern::Constant(values) => {
-            parameters.extend(params.iter().zip(values).map(|(p, v)| (p.name.to_owned(), value(p, *v))));
+            parameters.extend(
+                params
+                    .iter()
+                    .zip(values)
+                    .map(|(p, v)| (p.name.to_owned(), value(p, *v))),
+            );
             None
         }
         Pattern::ByTime { start, per_s } => {
-            parameters.extend(params.iter().zip(start).map(|(p, v)| (p.name.to_owned(), value(p, *v))));
+            parameters.extend(
+                params
+                    .iter()
+                    .zip(start)
+                    .map(|(p, v)| (p.name.to_owned(), value(p, *v))),
+            );
             let slopes = params.iter().zip(per_s).filter(|(_, slope)| **slope != 0.0);
             parameters.extend(slopes.map(|(p, slope)| (format!("{}_per_s", p.name), Value::Float(*slope))));
             Some(config::Pattern::Time)
         }
         Pattern::ByRun(runs) => {
             parameters.extend(params.iter().enumerate().map(|(i, p)| {
-                (p.name.to_owned(), Value::Array(runs.iter().map(|values| value(p, values[i])).collect()))
+                (
+                    p.name.to_owned(),
+                    Value::Array(runs.iter().map(|values| value(p, values[i])).collect()),
+                )
             }));
             Some(config::Pattern::Run)
         }
     };
-    config::Effect { kind: setting.spec.name.to_owned(), by, parameters }
+    config::Effect {
+        kind: setting.spec.name.to_owned(),
+        by,
+        parameters,
+    }
 }

@@ -29,7 +29,9 @@ pub(crate) fn minimise(
         for i in 0..normal.nrows() {
             damped[(i, i)] += damping * normal[(i, i)].max(1e-12);
         }
-        let Some(step) = damped.cholesky().map(|factor| factor.solve(&gradient)) else { break };
+        let Some(step) = damped.cholesky().map(|factor| factor.solve(&gradient)) else {
+            break;
+        };
         let trial = &parameters - &step;
         let (trial_residuals, trial_jacobian) = model(&trial);
         // Written so that a NaN is no improvement.
@@ -47,8 +49,15 @@ pub(crate) fn minimise(
             }
         }
     }
-    let covariance = jacobian.tr_mul(&jacobian).cholesky().map(|factor| factor.inverse());
-    Minimum { squares: residuals.norm_squared(), parameters, covariance }
+    let covariance = jacobian
+        .tr_mul(&jacobian)
+        .cholesky()
+        .map(|factor| factor.inverse());
+    Minimum {
+        squares: residuals.norm_squared(),
+        parameters,
+        covariance,
+    }
 }
 
 #[cfg(test)]

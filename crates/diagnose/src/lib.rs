@@ -9,8 +9,9 @@ mod response_fit;
 
 pub use candidate::Candidate;
 pub use error::Error;
-pub use laps::{Atlas, Diagnosis, Explanation, FourNumbers, Quadratic, Simulate, Verdict, debug as laps_debug};
+pub use laps::{Atlas, Diagnosis, Explanation, FourNumbers, Quadratic, Simulate, Verdict};
 pub use log::{
-    Channel, Corners, Decided, LogDiagnosis, LogExplanation, LogRow, LogVerdict, UnlistedEffect, diagnose_logs,
+    Channel, Corners, Decided, LogDiagnosis, LogExplanation, LogRow, LogVerdict, UnlistedEffect,
+    diagnose_logs,
 };
 pub use response_fit::{Estimate, ResponseFit};

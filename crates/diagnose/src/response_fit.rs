@@ -46,15 +46,24 @@ impl ResponseFit {
     /// Fewer than five pairs with positive readings at three or more distances, a negative distance, or pairs that do
     /// not determine the three numbers.
     pub fn new(pairs: &[[f64; 2]]) -> Result<Self, Error> {
-        if let Some(bad) = pairs.iter().find(|p| !(p[0] >= 0.0 && p[0].is_finite() && p[1].is_finite())) {
-            return Err(Error::Pair { distance_m: bad[0], reading: bad[1] });
+        if let Some(bad) = pairs
+            .iter()
+            .find(|p| !(p[0] >= 0.0 && p[0].is_finite() && p[1].is_finite()))
+        {
+            return Err(Error::Pair {
+                distance_m: bad[0],
+                reading: bad[1],
+            });
         }
         let used: Vec<[f64; 2]> = pairs.iter().copied().filter(|p| p[1] > 0.0).collect();
         let mut distances: Vec<f64> = used.iter().map(|p| p[0]).collect();
         distances.sort_by(f64::total_cmp);
         distances.dedup();
         if used.len() < 5 || distances.len() < 3 {
-            return Err(Error::TooFewPairs { pairs: used.len(), distances: distances.len() });
+            return Err(Error::TooFewPairs {
+                pairs: used.len(),
+                distances: distances.len(),
+            });
         }
         let minimum = fit(&used).ok_or(Error::Undetermined)?;
         let covariance = minimum.covariance.as_ref().ok_or(Error::Undetermined)?;
@@ -65,12 +74,20 @@ impl ResponseFit {
             // Of the logarithm's error to first order.
             let value = minimum.parameters[i].exp();
             let standard_error = value * residual_log * covariance[(i, i)].sqrt();
-            Estimate { value, standard_error, half_width_95: t95 * standard_error }
+            Estimate {
+                value,
+                standard_error,
+                half_width_95: t95 * standard_error,
+            }
         };
         let response = response(&minimum.parameters);
         let left_out = |i: usize| {
-            let others: Vec<[f64; 2]> =
-                used.iter().enumerate().filter(|(j, _)| *j != i).map(|(_, p)| *p).collect();
+            let others: Vec<[f64; 2]> = used
+                .iter()
+                .enumerate()
+                .filter(|(j, _)| *j != i)
+                .map(|(_, p)| *p)
+                .collect();
             let other = fit(&others).ok_or(Error::Undetermined)?;
             Ok(self::response(&other.parameters).reading(used[i][0]) / used[i][1] - 1.0)
         };
@@ -103,14 +120,20 @@ impl ResponseFit {
 
 fn response(log_parameters: &DVector<f64>) -> Response {
     let [a_counts, d0_m, exponent] = [0, 1, 2].map(|i| log_parameters[i].exp());
-    Response::Improved { a_counts, d0_m, exponent }
+    Response::Improved {
+        a_counts,
+        d0_m,
+        exponent,
+    }
 }
 
 /// The best of several descents over (log a, log d0, log p): far from the knee the surface has flat arms.
 fn fit(pairs: &[[f64; 2]]) -> Option<Minimum> {
     let largest = pairs.iter().map(|p| p[1]).fold(f64::MIN, f64::max);
     let farthest = pairs.iter().map(|p| p[0]).fold(f64::MIN, f64::max);
-    let starts = [0.01, 0.05, 0.2, 0.6].into_iter().flat_map(|share| [1.5, 4.0].map(|p: f64| (share * farthest, p)));
+    let starts = [0.01, 0.05, 0.2, 0.6]
+        .into_iter()
+        .flat_map(|share| [1.5, 4.0].map(|p: f64| (share * farthest, p)));
     starts
         .map(|(d0, p): (f64, f64)| {
             let start = DVector::from_vec(vec![largest.ln(), d0.ln(), p.ln()]);
@@ -127,8 +150,16 @@ fn residuals(pairs: &[[f64; 2]], parameters: &DVector<f64>) -> (DVector<f64>, DM
     let mut jacobian = DMatrix::zeros(pairs.len(), 3);
     for (i, [distance, reading]) in pairs.iter().enumerate() {
         // (d / d0)^p and its share of 1 + itself; a distance of 0 has neither.
-        let log_ratio = if *distance > 0.0 { distance.ln() - log_d0 } else { 0.0 };
-        let power = if *distance > 0.0 { (p * log_ratio).exp() } else { 0.0 };
+        let log_ratio = if *distance > 0.0 {
+            distance.ln() - log_d0
+        } else {
+            0.0
+        };
+        let power = if *distance > 0.0 {
+            (p * log_ratio).exp()
+        } else {
+            0.0
+        };
         let share = power / (1.0 + power);
         residuals[i] = log_a - power.ln_1p() - reading.ln();
         jacobian[(i, 0)] = 1.0;
@@ -161,13 +192,24 @@ mod tests {
         let fit = ResponseFit::new(&PAIRS).unwrap();
         assert!((fit.a_counts.value - 4202.93).abs() < 0.005, "{:?}", fit.a_counts);
         assert!((fit.d0_m.value - 0.005_219_53).abs() < 5e-9, "{:?}", fit.d0_m);
-        assert!((fit.exponent.value - 1.572_816_92).abs() < 5e-9, "{:?}", fit.exponent);
+        assert!(
+            (fit.exponent.value - 1.572_816_92).abs() < 5e-9,
+            "{:?}",
+            fit.exponent
+        );
     }
 
     #[test]
     fn exact_pairs_give_their_response_back() {
-        let truth = Response::Improved { a_counts: 900.0, d0_m: 0.02, exponent: 3.0 };
-        let pairs: Vec<[f64; 2]> = (0..20).map(|i| f64::from(i) * 0.004).map(|d| [d, truth.reading(d)]).collect();
+        let truth = Response::Improved {
+            a_counts: 900.0,
+            d0_m: 0.02,
+            exponent: 3.0,
+        };
+        let pairs: Vec<[f64; 2]> = (0..20)
+            .map(|i| f64::from(i) * 0.004)
+            .map(|d| [d, truth.reading(d)])
+            .collect();
         let fit = ResponseFit::new(&pairs).unwrap();
         assert!((fit.a_counts.value / 900.0 - 1.0).abs() < 1e-9);
         assert!((fit.d0_m.value / 0.02 - 1.0).abs() < 1e-9);
@@ -177,7 +219,10 @@ mod tests {
 
     #[test]
     fn what_cannot_be_fitted_is_refused() {
-        assert!(matches!(ResponseFit::new(&PAIRS[..4]), Err(Error::TooFewPairs { pairs: 4, .. })));
+        assert!(matches!(
+            ResponseFit::new(&PAIRS[..4]),
+            Err(Error::TooFewPairs { pairs: 4, .. })
+        ));
         let mut pairs = PAIRS.to_vec();
         pairs[3][1] = f64::NAN;
         assert!(matches!(ResponseFit::new(&pairs), Err(Error::Pair { .. })));

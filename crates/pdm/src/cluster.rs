@@ -77,9 +77,7 @@ pub(crate) fn matrix(name: &str, rows: &[Vec<f64>]) -> Result<DMatrix<f64>, Erro
     for (index, row) in rows.iter().enumerate() {
         check(name, index + 1, row, gates)?;
     }
-    Ok(DMatrix::from_fn(rows.len(), gates, |lap, gate| {
-        rows[lap][gate]
-    }))
+    Ok(DMatrix::from_fn(rows.len(), gates, |lap, gate| rows[lap][gate]))
 }
 
 fn check(name: &str, lap: usize, row: &[f64], expected: usize) -> Result<(), Error> {
@@ -110,10 +108,7 @@ mod tests {
     #[test]
     fn a_cluster_keeps_its_laps_in_rows() {
         let cluster = Cluster::new("a", &[vec![1.0, 2.0, 3.0], vec![3.0, 2.0, 7.0]]).unwrap();
-        assert_eq!(
-            (cluster.name(), cluster.len(), cluster.dimension()),
-            ("a", 2, 3)
-        );
+        assert_eq!((cluster.name(), cluster.len(), cluster.dimension()), ("a", 2, 3));
         assert_eq!(cluster.laps()[(1, 2)], 7.0);
         assert_eq!(cluster.mean(), [2.0, 2.0, 5.0]);
     }
@@ -133,10 +128,7 @@ mod tests {
             refusal(&[vec![1.0], vec![1.0, 2.0]]),
             "lap 2 of `a` has 2 gates, its first lap has 1"
         );
-        assert_eq!(
-            refusal(&[vec![1.0, f64::NAN]]),
-            "lap 1 of `a` is NaN at gate 2"
-        );
+        assert_eq!(refusal(&[vec![1.0, f64::NAN]]), "lap 1 of `a` is NaN at gate 2");
         assert_eq!(
             refusal(&[vec![0.0], vec![f64::INFINITY]]),
             "lap 2 of `a` is inf at gate 1"

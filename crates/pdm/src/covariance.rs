@@ -46,8 +46,7 @@ impl Metric {
             return None;
         }
         let deviations = variances.map(f64::sqrt);
-        let correlation =
-            covariance.map_with_location(|i, j, value| value / (deviations[i] * deviations[j]));
+        let correlation = covariance.map_with_location(|i, j, value| value / (deviations[i] * deviations[j]));
         let correlation = Cholesky::new(correlation)?;
         let regular = correlation
             .l_dirty()

@@ -24,10 +24,7 @@ impl Decomposition {
         } else {
             matrix.clone()
         };
-        let mut vectors: Vec<Vec<f64>> = rows
-            .row_iter()
-            .map(|row| row.iter().copied().collect())
-            .collect();
+        let mut vectors: Vec<Vec<f64>> = rows.row_iter().map(|row| row.iter().copied().collect()).collect();
         (0..MOST_SWEEPS).find(|_| !sweep(&mut vectors, zero))?;
         let mut sorted: Vec<_> = vectors
             .iter()
@@ -92,11 +89,7 @@ mod tests {
         let matrix = DMatrix::from_row_slice(2, 3, &[1.0, 2.0, 2.0, -1.0, -2.0, -2.0]);
         let svd = Decomposition::new(&matrix, 1e-14).unwrap();
         assert_eq!(svd.values.len(), 1);
-        assert!(
-            (svd.values[0] - 18_f64.sqrt()).abs() < 1e-14,
-            "{:?}",
-            svd.values
-        );
+        assert!((svd.values[0] - 18_f64.sqrt()).abs() < 1e-14, "{:?}", svd.values);
         assert!(
             (svd.vectors[(0, 0)].abs() - 1.0 / 3.0).abs() < 1e-15,
             "{}",

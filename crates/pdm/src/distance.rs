@@ -28,12 +28,11 @@ pub fn mahalanobis(point: &[f64], cluster: &Projection) -> Result<f64, Error> {
     };
     cluster.carries(modes)?;
     let covariance = scatter(&cluster.first(modes)) / (laps - 1) as f64;
-    let metric = Metric::new(&covariance, cluster.zero_variance()).ok_or_else(|| {
-        Error::SingularCovariance {
+    let metric =
+        Metric::new(&covariance, cluster.zero_variance()).ok_or_else(|| Error::SingularCovariance {
             clusters: vec![cluster.name().to_owned()],
             modes,
-        }
-    })?;
+        })?;
     let mean = cluster.row_mean();
     Ok(metric.norm(&DVector::from_fn(modes, |mode, _| point[mode] - mean[mode])))
 }
@@ -142,19 +141,14 @@ mod tests {
     fn too_few_laps_are_named_and_counted() {
         let [one, two, three] = [1, 2, 3].map(|laps| projection("p", &gaussian(1, laps, 2)));
         let refusal = |x: &Projection, y: &Projection| distance(x, y).unwrap_err().to_string();
-        let expected =
-            "`p` has 1 lap, `p` has 3 laps: 2 modes or gates need at least 2 laps each and 4 together; give more laps or compare in fewer modes";
+        let expected = "`p` has 1 lap, `p` has 3 laps: 2 modes or gates need at least 2 laps each and 4 together; give more laps or compare in fewer modes";
         assert_eq!(refusal(&one, &three), expected);
         let wide = projection("w", &gaussian(1, 3, 5));
-        let expected =
-            "`w` has 3 laps, `w` has 3 laps: 5 modes or gates need at least 2 laps each and 7 together; give more laps or compare in fewer modes";
+        let expected = "`w` has 3 laps, `w` has 3 laps: 5 modes or gates need at least 2 laps each and 7 together; give more laps or compare in fewer modes";
         assert_eq!(refusal(&wide, &wide), expected);
         assert_eq!(refusal(&two, &wide), "`w` has 5 coordinates, `p` has 2");
         let expected = "`p` has 2 laps: 2 modes or gates need at least 3 laps each and 3 together; give more laps or compare in fewer modes";
-        assert_eq!(
-            mahalanobis(&[0.0, 0.0], &two).unwrap_err().to_string(),
-            expected
-        );
+        assert_eq!(mahalanobis(&[0.0, 0.0], &two).unwrap_err().to_string(), expected);
         assert!(mahalanobis(&[0.0], &three).is_err());
     }
 
@@ -168,10 +162,7 @@ mod tests {
         };
         let pair = projected(&[line("a", 0.0), line("b", 3.0)], Modes::All);
         let expected = "the covariance of `a` and `b` is singular in 2 modes: compare in fewer";
-        assert_eq!(
-            distance(&pair[0], &pair[1]).unwrap_err().to_string(),
-            expected
-        );
+        assert_eq!(distance(&pair[0], &pair[1]).unwrap_err().to_string(), expected);
         let expected = "the covariance of `a` is singular in 2 modes: compare in fewer";
         assert_eq!(
             mahalanobis(&[0.0, 0.0], &pair[0]).unwrap_err().to_string(),
@@ -180,10 +171,7 @@ mod tests {
         // two that stand still but for rounding, in a model with a third that does not
         let still = |name: &str, at: f64| Cluster::new(name, &vec![vec![at, 0.3]; 7]).unwrap();
         let moving = cluster("m", &gaussian(1, 9, 2));
-        let three = projected(
-            &[still("a", 0.1), still("b", 0.2), moving],
-            Modes::default(),
-        );
+        let three = projected(&[still("a", 0.1), still("b", 0.2), moving], Modes::default());
         assert!(matches!(
             distance(&three[0], &three[1]),
             Err(Error::SingularCovariance { .. })

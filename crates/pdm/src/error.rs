@@ -109,9 +109,7 @@ pub enum Error {
     #[error("a permutation test needs at least one permutation")]
     NoPermutations,
     /// An ellipse of no size.
-    #[error(
-        "an ellipse of {sigmas} standard deviations cannot be drawn: a positive number is needed"
-    )]
+    #[error("an ellipse of {sigmas} standard deviations cannot be drawn: a positive number is needed")]
     Sigmas {
         /// What was asked for.
         sigmas: f64,

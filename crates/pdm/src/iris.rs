@@ -91,10 +91,7 @@ const PAIRS: [Row; 6] = [
 
 fn species() -> [Cluster; 3] {
     [
-        (
-            "setosa",
-            include_str!("../../../tests/data/iris/setosa.csv"),
-        ),
+        ("setosa", include_str!("../../../tests/data/iris/setosa.csv")),
         (
             "versicolor",
             include_str!("../../../tests/data/iris/versicolor.csv"),

@@ -73,8 +73,8 @@ impl Pdm {
             });
         }
         let zero = zero_singular_value(&laps);
-        let svd = Decomposition::new(&centred(&laps), zero)
-            .ok_or(Error::NoConvergence { laps: count, gates })?;
+        let svd =
+            Decomposition::new(&centred(&laps), zero).ok_or(Error::NoConvergence { laps: count, gates })?;
         let rank = svd.values.len().min(gates).min(count - 1); // eq. 3
         if rank == 0 {
             return Err(Error::NoVariance { laps: count });
@@ -235,12 +235,7 @@ mod tests {
     #[test]
     fn four_points_have_the_model_computed_by_hand() {
         // centred (3 4; -3 -4; 4 -3; -4 3) / 5 times 5, 5, 1, 1: variances 50/3 and 2/3 along (3 4)/5 and (4 -3)/5
-        let points = [
-            vec![4.0, 6.0],
-            vec![-2.0, -2.0],
-            vec![1.8, 1.4],
-            vec![0.2, 2.6],
-        ];
+        let points = [vec![4.0, 6.0], vec![-2.0, -2.0], vec![1.8, 1.4], vec![0.2, 2.6]];
         let pdm = Pdm::fit([&Cluster::new("a", &points).unwrap()]).unwrap();
         let is = [
             pdm.mean(),
@@ -286,8 +281,7 @@ mod tests {
             cluster("one", &laps(1, 1, 3, 1)),
             cluster("two", &laps(1, 4, 2, 2)),
         ];
-        let refusal =
-            |clusters: &[&Cluster]| Pdm::fit(clusters.iter().copied()).unwrap_err().to_string();
+        let refusal = |clusters: &[&Cluster]| Pdm::fit(clusters.iter().copied()).unwrap_err().to_string();
         assert_eq!(
             refusal(&[]),
             "`the model` has 0 laps of 0 gates: at least one of each is needed"
@@ -296,10 +290,7 @@ mod tests {
             refusal(&[&one]),
             "`one` has 1 lap: 3 modes or gates need at least 1 laps each and 2 together; give more laps or compare in fewer modes"
         );
-        assert_eq!(
-            refusal(&[&one, &two]),
-            "`two` has 2 coordinates, `one` has 3"
-        );
+        assert_eq!(refusal(&[&one, &two]), "`two` has 2 coordinates, `one` has 3");
         let same = Cluster::new("same", &vec![vec![0.1, 0.7]; 20]).unwrap();
         assert_eq!(
             refusal(&[&same]),
@@ -340,11 +331,7 @@ mod tests {
             (5, 1, 1),
         ] {
             let pdm = Pdm::fit([&cluster("a", &laps(7, count, gates, gates))]).unwrap();
-            assert_eq!(
-                pdm.degrees_of_freedom(),
-                most,
-                "{count} laps of {gates} gates"
-            );
+            assert_eq!(pdm.degrees_of_freedom(), most, "{count} laps of {gates} gates");
         }
     }
 

@@ -39,12 +39,7 @@ impl Projection {
         })
     }
 
-    pub(crate) fn in_modes(
-        name: &str,
-        points: DMatrix<f64>,
-        modes: Modes,
-        zero_variance: f64,
-    ) -> Self {
+    pub(crate) fn in_modes(name: &str, points: DMatrix<f64>, modes: Modes, zero_variance: f64) -> Self {
         Self {
             name: name.to_owned(),
             points,

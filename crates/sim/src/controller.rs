@@ -41,7 +41,10 @@ impl Controller {
         let right = readings[0] + readings[1] + readings[2];
         let left = readings[5] + readings[6] + readings[7];
         match *self {
-            Self::RuleBased { speed_m_s, threshold_counts } => {
+            Self::RuleBased {
+                speed_m_s,
+                threshold_counts,
+            } => {
                 let turn = if right > threshold_counts {
                     (-1.0, 1.0)
                 } else if left > threshold_counts {
@@ -49,9 +52,15 @@ impl Controller {
                 } else {
                     (1.0, 1.0)
                 };
-                WheelSpeeds { left_m_s: turn.0 * speed_m_s, right_m_s: turn.1 * speed_m_s }
+                WheelSpeeds {
+                    left_m_s: turn.0 * speed_m_s,
+                    right_m_s: turn.1 * speed_m_s,
+                }
             }
-            Self::Braitenberg { speed_m_s, gain_per_count } => WheelSpeeds {
+            Self::Braitenberg {
+                speed_m_s,
+                gain_per_count,
+            } => WheelSpeeds {
                 left_m_s: speed_m_s * (1.0 + gain_per_count * (left - right)),
                 right_m_s: speed_m_s * (1.0 + gain_per_count * (right - left)),
             },
@@ -68,12 +77,20 @@ impl Controller {
     /// The controller with its speed V and its own parameter (K or T) times these factors.
     pub fn scaled(&self, speed: f64, parameter: f64) -> Self {
         match *self {
-            Self::RuleBased { speed_m_s, threshold_counts } => {
-                Self::RuleBased { speed_m_s: speed * speed_m_s, threshold_counts: parameter * threshold_counts }
-            }
-            Self::Braitenberg { speed_m_s, gain_per_count } => {
-                Self::Braitenberg { speed_m_s: speed * speed_m_s, gain_per_count: parameter * gain_per_count }
-            }
+            Self::RuleBased {
+                speed_m_s,
+                threshold_counts,
+            } => Self::RuleBased {
+                speed_m_s: speed * speed_m_s,
+                threshold_counts: parameter * threshold_counts,
+            },
+            Self::Braitenberg {
+                speed_m_s,
+                gain_per_count,
+            } => Self::Braitenberg {
+                speed_m_s: speed * speed_m_s,
+                gain_per_count: parameter * gain_per_count,
+            },
         }
     }
 }
@@ -82,8 +99,14 @@ impl Controller {
 mod tests {
     use super::*;
 
-    const BRAITENBERG: Controller = Controller::Braitenberg { speed_m_s: 0.05, gain_per_count: 0.0005 };
-    const RULES: Controller = Controller::RuleBased { speed_m_s: 0.05, threshold_counts: 500.0 };
+    const BRAITENBERG: Controller = Controller::Braitenberg {
+        speed_m_s: 0.05,
+        gain_per_count: 0.0005,
+    };
+    const RULES: Controller = Controller::RuleBased {
+        speed_m_s: 0.05,
+        threshold_counts: 500.0,
+    };
 
     #[test]
     fn both_turn_away_from_a_wall() {
@@ -91,16 +114,25 @@ mod tests {
         let left_wall = [0.0, 0.0, 0.0, 0.0, 0.0, 400.0, 300.0, 200.0];
         for controller in [BRAITENBERG, RULES] {
             let from_right = controller.command(&right_wall);
-            assert!(from_right.right_m_s > from_right.left_m_s, "{controller:?} must turn left: {from_right:?}");
+            assert!(
+                from_right.right_m_s > from_right.left_m_s,
+                "{controller:?} must turn left: {from_right:?}"
+            );
             let from_left = controller.command(&left_wall);
-            assert!(from_left.left_m_s > from_left.right_m_s, "{controller:?} must turn right: {from_left:?}");
+            assert!(
+                from_left.left_m_s > from_left.right_m_s,
+                "{controller:?} must turn right: {from_left:?}"
+            );
         }
     }
 
     #[test]
     fn back_sensors_are_ignored() {
         let behind = [0.0, 0.0, 0.0, 4000.0, 3000.0, 0.0, 0.0, 0.0];
-        let straight = WheelSpeeds { left_m_s: 0.05, right_m_s: 0.05 };
+        let straight = WheelSpeeds {
+            left_m_s: 0.05,
+            right_m_s: 0.05,
+        };
         assert_eq!(BRAITENBERG.command(&behind), straight);
         assert_eq!(RULES.command(&behind), straight);
     }
@@ -109,9 +141,21 @@ mod tests {
     fn rules_compare_strictly_and_look_right_first() {
         let mut readings = [0.0; 8];
         readings[2] = 500.0;
-        assert_eq!(RULES.command(&readings), WheelSpeeds { left_m_s: 0.05, right_m_s: 0.05 });
+        assert_eq!(
+            RULES.command(&readings),
+            WheelSpeeds {
+                left_m_s: 0.05,
+                right_m_s: 0.05
+            }
+        );
         (readings[2], readings[5]) = (501.0, 4000.0);
-        assert_eq!(RULES.command(&readings), WheelSpeeds { left_m_s: -0.05, right_m_s: 0.05 });
+        assert_eq!(
+            RULES.command(&readings),
+            WheelSpeeds {
+                left_m_s: -0.05,
+                right_m_s: 0.05
+            }
+        );
     }
 
     #[test]

@@ -33,7 +33,9 @@ pub enum Error {
         nearest: String,
     },
     /// A body that does not fit between the walls.
-    #[error("the corridor is {narrowest_m:.4} m wide at ({x_m:.3}, {y_m:.3}), too narrow for a robot of {body_m:.4} m; widen it there, or lower robot.body_radius_m or wall.thickness_m")]
+    #[error(
+        "the corridor is {narrowest_m:.4} m wide at ({x_m:.3}, {y_m:.3}), too narrow for a robot of {body_m:.4} m; widen it there, or lower robot.body_radius_m or wall.thickness_m"
+    )]
     TooNarrow {
         /// Distance between the faces of the walls there, m.
         narrowest_m: f64,

@@ -64,10 +64,17 @@ impl<'w> Forecast<'w> {
     /// # Errors
     /// A further effect out of range, an effect without values for this run.
     pub fn beside(world: &'w World<'w>, further: &[Setting]) -> Result<Self, Error> {
-        further.iter().enumerate().try_for_each(|(i, setting)| setting.check(i))?;
+        further
+            .iter()
+            .enumerate()
+            .try_for_each(|(i, setting)| setting.check(i))?;
         let settings: Vec<Setting> = world.model.effects.iter().chain(further).cloned().collect();
         let effects = Active::all(&settings, world.run)?;
-        let moving: Vec<Setting> = further.iter().filter(|s| s.spec.stage == Stage::World).cloned().collect();
+        let moving: Vec<Setting> = further
+            .iter()
+            .filter(|s| s.spec.stage == Stage::World)
+            .cloned()
+            .collect();
         let machine = altered(&world.model.machine, &effects);
         let mut forecast = Self {
             world,
@@ -133,7 +140,10 @@ impl<'w> Forecast<'w> {
     pub fn tick(&mut self, time_s: f64) {
         self.now.time_s = time_s;
         if self.drifting {
-            self.effects.iter_mut().chain(&mut self.displacing).for_each(|active| active.advance(time_s));
+            self.effects
+                .iter_mut()
+                .chain(&mut self.displacing)
+                .for_each(|active| active.advance(time_s));
             self.machine = altered(&self.world.model.machine, &self.effects);
             self.sights = sights(&self.machine);
             // As seldom as a run does it.
@@ -196,9 +206,15 @@ impl<'w> Forecast<'w> {
 
     /// What effects make of the readings.
     fn change_readings(&mut self, pose: Pose, readings: &mut Readings) {
-        let now = Moment { pose, step_s: self.world.rules().control_step_s, ..self.now };
+        let now = Moment {
+            pose,
+            step_s: self.world.rules().control_step_s,
+            ..self.now
+        };
         for active in &mut self.effects {
-            active.effect.readings(&active.values, &now, &self.machine, readings);
+            active
+                .effect
+                .readings(&active.values, &now, &self.machine, readings);
         }
     }
 
@@ -214,7 +230,11 @@ impl<'w> Forecast<'w> {
         // Beyond so many physics steps the last stands for all that follow.
         let step_s = self.world.rules().control_step_s / count as f64;
         let covariance = self.slip_covariance(&pushes[..count.min(MOST)], end.position, step_s);
-        Motion { pose: end, turned: end.position - pose.position - drifted, covariance }
+        Motion {
+            pose: end,
+            turned: end.position - pose.position - drifted,
+            covariance,
+        }
     }
 
     /// Where one control step leads without slip.
@@ -225,11 +245,21 @@ impl<'w> Forecast<'w> {
     /// The physics steps of one control step: the pose after them and what drift added. `each` gets the middle of every
     /// step and the speeds of the wheels.
     #[inline]
-    fn roll(&mut self, pose: Pose, command: WheelSpeeds, mut each: impl FnMut(Pose, WheelSpeeds)) -> (Pose, Vec2) {
+    fn roll(
+        &mut self,
+        pose: Pose,
+        command: WheelSpeeds,
+        mut each: impl FnMut(Pose, WheelSpeeds),
+    ) -> (Pose, Vec2) {
         let rules = self.world.rules();
         let step_s = rules.control_step_s / f64::from(rules.physics_steps);
         let start_s = self.now.time_s;
-        let mut now = Moment { pose, command, step_s, ..self.now };
+        let mut now = Moment {
+            pose,
+            command,
+            step_s,
+            ..self.now
+        };
         let (mut at, mut drifted) = (pose, Vec2::ZERO);
         for k in 0..rules.physics_steps {
             now.time_s = start_s + f64::from(k) * step_s;
@@ -240,10 +270,22 @@ impl<'w> Forecast<'w> {
                 twist = active.effect.twist(&active.values, &now, twist);
             }
             let next = at.advance(twist, step_s);
-            each(Pose { position: at.position.midpoint(next.position), heading: (at.heading + next.heading) * 0.5 }, ground);
-            let drift: Vec2 =
-                self.effects.iter().map(|active| active.effect.drift_m_s(&active.values, &now) * step_s).sum();
-            at = Pose { position: next.position + drift, ..next };
+            each(
+                Pose {
+                    position: at.position.midpoint(next.position),
+                    heading: (at.heading + next.heading) * 0.5,
+                },
+                ground,
+            );
+            let drift: Vec2 = self
+                .effects
+                .iter()
+                .map(|active| active.effect.drift_m_s(&active.values, &now) * step_s)
+                .sum();
+            at = Pose {
+                position: next.position + drift,
+                ..next
+            };
             drifted += drift;
         }
         (at, drifted)
@@ -294,7 +336,9 @@ impl<'w> Forecast<'w> {
                     readings[lane] += 1.0;
                 }
                 for active in &mut effects {
-                    active.effect.readings(&active.values, &self.now, &self.machine, &mut readings);
+                    active
+                        .effect
+                        .readings(&active.values, &self.now, &self.machine, &mut readings);
                 }
             }
             Ok(readings)
@@ -312,4 +356,3 @@ impl<'w> Forecast<'w> {
         Ok(if unchanged { None } else { Some(through) })
     }
 }
-

@@ -76,23 +76,53 @@ impl Model {
     /// # Errors
     /// The first key of `model.toml` whose value is not, NaN and infinities included.
     pub fn check(&self) -> Result<(), Error> {
-        let Machine { robot, response, noise, controller, .. } = &self.machine;
+        let Machine {
+            robot,
+            response,
+            noise,
+            controller,
+            ..
+        } = &self.machine;
         let positive = f64::MIN_POSITIVE;
         check("wall.max_error_m", self.wall.max_error_m, 1e-9, 1.0)?;
         check("wall.thickness_m", self.wall.thickness_m, 0.0, 0.1)?;
         check("robot.body_radius_m", robot.body_radius_m, positive, 10.0)?;
         check("robot.axle_m", robot.axle_m, 1e-6, 10.0)?;
-        check("robot.wheel_speed_limit_m_s", robot.wheel_speed_limit_m_s, positive, 100.0)?;
+        check(
+            "robot.wheel_speed_limit_m_s",
+            robot.wheel_speed_limit_m_s,
+            positive,
+            100.0,
+        )?;
         for (i, mount) in self.machine.mounts.iter().enumerate() {
             check(&format!("sensor.mounts.{i}.x_m"), mount.position.x, -1.0, 1.0)?;
             check(&format!("sensor.mounts.{i}.y_m"), mount.position.y, -1.0, 1.0)?;
-            check(&format!("sensor.mounts.{i}.angle_rad"), mount.angle_rad, -7.0, 7.0)?;
+            check(
+                &format!("sensor.mounts.{i}.angle_rad"),
+                mount.angle_rad,
+                -7.0,
+                7.0,
+            )?;
         }
         check("sensor.range_m", self.machine.range_m, 1e-3, 100.0)?;
-        check("sensor.full_scale_counts", self.machine.full_scale_counts, positive, 1e9)?;
+        check(
+            "sensor.full_scale_counts",
+            self.machine.full_scale_counts,
+            positive,
+            1e9,
+        )?;
         check_response(response)?;
-        let kind = if matches!(response, Response::Table(_)) { "original" } else { "improved" };
-        check(&format!("sensor.{kind}.noise_fraction"), noise.fraction, 0.0, 10.0)?;
+        let kind = if matches!(response, Response::Table(_)) {
+            "original"
+        } else {
+            "improved"
+        };
+        check(
+            &format!("sensor.{kind}.noise_fraction"),
+            noise.fraction,
+            0.0,
+            10.0,
+        )?;
         check(&format!("sensor.{kind}.noise_counts"), noise.counts, 0.0, 1e6)?;
         match *controller {
             Controller::Braitenberg { gain_per_count, .. } => {
@@ -106,17 +136,29 @@ impl Model {
         check("controller.step_s", self.run.control_step_s, 1e-4, 10.0)?;
         check("slip.level", self.machine.slip_level, 0.0, 1.0)?;
         check("camera.noise_m", self.machine.camera_noise_m, 0.0, 1.0)?;
-        check("run.physics_steps", f64::from(self.run.physics_steps), 1.0, 1000.0)?;
+        check(
+            "run.physics_steps",
+            f64::from(self.run.physics_steps),
+            1.0,
+            1000.0,
+        )?;
         check("run.start_offset_m", self.run.start_offset_m, 0.0, 1.0)?;
         check("run.start_heading_rad", self.run.start_heading_rad, 0.0, 3.2)?;
         check("run.patience_laps", self.run.patience_laps, 1.0, 1e6)?;
-        self.effects.iter().enumerate().try_for_each(|(i, setting)| setting.check(i))
+        self.effects
+            .iter()
+            .enumerate()
+            .try_for_each(|(i, setting)| setting.check(i))
     }
 }
 
 fn check_response(response: &Response) -> Result<(), Error> {
     match response {
-        Response::Improved { a_counts, d0_m, exponent } => {
+        Response::Improved {
+            a_counts,
+            d0_m,
+            exponent,
+        } => {
             check("sensor.improved.a_counts", *a_counts, f64::MIN_POSITIVE, 1e9)?;
             check("sensor.improved.d0_m", *d0_m, 1e-9, 100.0)?;
             check("sensor.improved.exponent", *exponent, 1e-3, 100.0)

@@ -29,7 +29,9 @@ impl Streams {
 
 /// FNV-1a, 64 bit (Fowler, Noll, Vo): tells purposes apart in a generator's key.
 fn fnv1a(text: &str) -> u64 {
-    text.bytes().fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
+    text.bytes().fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
+        (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
+    })
 }
 
 /// One purpose's draws.
@@ -81,7 +83,12 @@ mod tests {
     #[test]
     fn purposes_runs_and_seeds_differ() {
         let draw = |seed, run, purpose: &str| Streams { seed, run }.open(purpose).symmetric();
-        let all = [draw(1, 0, "slip"), draw(1, 0, "camera"), draw(1, 1, "slip"), draw(2, 0, "slip")];
+        let all = [
+            draw(1, 0, "slip"),
+            draw(1, 0, "camera"),
+            draw(1, 1, "slip"),
+            draw(2, 0, "slip"),
+        ];
         for (i, a) in all.iter().enumerate() {
             assert!(all[i + 1..].iter().all(|b| a != b), "{all:?}");
         }
@@ -99,6 +106,9 @@ mod tests {
         }
         // Four standard errors: a false alarm in 1 of 16 000 seeds.
         assert!(mean.abs() < 4.0 * (1.0 / 3.0 / n as f64).sqrt(), "mean {mean}");
-        assert!((square - 1.0 / 3.0).abs() < 4.0 * (4.0 / 45.0 / n as f64).sqrt(), "mean square {square}");
+        assert!(
+            (square - 1.0 / 3.0).abs() < 4.0 * (4.0 / 45.0 / n as f64).sqrt(),
+            "mean square {square}"
+        );
     }
 }

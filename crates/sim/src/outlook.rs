@@ -73,9 +73,13 @@ impl See<'_> {
         let middle = self.sights.len() / 2;
         for (number, sight) in self.sights.iter().enumerate() {
             let rays = sight.rays.placed(pose);
-            let hits = self.geometry.caster.cast(&self.geometry.walls, pose.position, &rays);
+            let hits = self
+                .geometry
+                .caster
+                .cast(&self.geometry.walls, pose.position, &rays);
             if number == middle {
-                (outlook.look.rays, outlook.look.hits, outlook.look.distance_m) = (rays, hits, hits.distance_m);
+                (outlook.look.rays, outlook.look.hits, outlook.look.distance_m) =
+                    (rays, hits, hits.distance_m);
             }
             for lane in (0..LANES).filter(|&lane| hits.distance_m[lane].is_finite()) {
                 let slope = self.distance_slope(pose, &rays, &hits, lane);
@@ -84,7 +88,17 @@ impl See<'_> {
                     outlook.look.deviation_m[lane] = deviation_m;
                 }
                 let (distance_m, factor) = self.met(&rays, &hits, lane);
-                self.add_ray(&mut outlook, lane, sight.weight, Glance { distance_m, slope, deviation_m, factor });
+                self.add_ray(
+                    &mut outlook,
+                    lane,
+                    sight.weight,
+                    Glance {
+                        distance_m,
+                        slope,
+                        deviation_m,
+                        factor,
+                    },
+                );
             }
         }
         if self.machine.beam.combine == Combine::Distances {
@@ -124,16 +138,28 @@ impl See<'_> {
             cos_incidence: towards.abs().min(1.0),
             site: self.scene.site(place),
         };
-        let factor = self.effects.iter().map(|active| active.effect.ray_factor(&active.values, &hit)).product();
-        let moved_m: f64 =
-            self.displacing.iter().map(|active| active.effect.displacement_m(&active.values, &hit.site)).sum();
+        let factor = self
+            .effects
+            .iter()
+            .map(|active| active.effect.ray_factor(&active.values, &hit))
+            .product();
+        let moved_m: f64 = self
+            .displacing
+            .iter()
+            .map(|active| active.effect.displacement_m(&active.values, &hit.site))
+            .sum();
         (distance_m + moved_m / not_grazing(towards), factor)
     }
 
     /// Adds one ray's share: of the reading, or of the shortfall from the range where a sensor averages distances.
     #[inline]
     fn add_ray(&self, outlook: &mut Outlook, lane: usize, weight: f64, glance: Glance) {
-        let Glance { distance_m, slope, deviation_m, factor } = glance;
+        let Glance {
+            distance_m,
+            slope,
+            deviation_m,
+            factor,
+        } = glance;
         let short_m = self.machine.range_m - distance_m;
         if short_m < -4.0 * deviation_m {
             return;
@@ -171,7 +197,11 @@ impl See<'_> {
         let normal = self.geometry.walls.normal(hits.segment[lane] as usize);
         let towards = not_grazing(normal.dot(direction));
         let swept = (rays.origin(lane) - pose.position).perp() + direction.perp() * hits.distance_m[lane];
-        [-normal.x / towards, -normal.y / towards, -normal.dot(swept) / towards]
+        [
+            -normal.x / towards,
+            -normal.y / towards,
+            -normal.dot(swept) / towards,
+        ]
     }
 }
 
@@ -180,7 +210,13 @@ impl Default for Look {
     fn default() -> Self {
         let rays = Rays::new([(track::Vec2::ZERO, track::Vec2::X); LANES]);
         let distance_m = [f64::INFINITY; LANES];
-        Self { distance_m, deviation_m: [0.0; LANES], rays, hits: Hits::NONE, response: [0.0; LANES] }
+        Self {
+            distance_m,
+            deviation_m: [0.0; LANES],
+            rays,
+            hits: Hits::NONE,
+            response: [0.0; LANES],
+        }
     }
 }
 
@@ -195,7 +231,11 @@ impl Look {
 #[inline]
 fn not_grazing(towards: f64) -> f64 {
     const GRAZING: f64 = 0.05;
-    if towards.abs() < GRAZING { GRAZING.copysign(towards) } else { towards }
+    if towards.abs() < GRAZING {
+        GRAZING.copysign(towards)
+    } else {
+        towards
+    }
 }
 
 /// Expectation of a response that bends, over the distance's uncertainty; where it bends more than a parabola can
@@ -219,14 +259,20 @@ fn seen_within(short_m: f64, deviation_m: f64) -> (f64, f64) {
 /// s^T M s.
 #[inline]
 fn quadratic(m: &PoseMatrix, s: [f64; 3]) -> f64 {
-    (0..3).map(|i| s[i] * (m[i][0] * s[0] + m[i][1] * s[1] + m[i][2] * s[2])).sum()
+    (0..3)
+        .map(|i| s[i] * (m[i][0] * s[0] + m[i][1] * s[1] + m[i][2] * s[2]))
+        .sum()
 }
 
 /// A response at a distance with its first and second derivative.
 #[inline]
 fn bend(response: &Response, distance_m: f64) -> (f64, f64, f64) {
     match *response {
-        Response::Improved { a_counts, d0_m, exponent } if distance_m > 0.0 => {
+        Response::Improved {
+            a_counts,
+            d0_m,
+            exponent,
+        } if distance_m > 0.0 => {
             let power = (exponent * (distance_m / d0_m).ln()).exp();
             let (value, share) = (a_counts / (1.0 + power), power / (1.0 + power));
             let rate = exponent / distance_m;

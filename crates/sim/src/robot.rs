@@ -14,7 +14,10 @@ pub struct WheelSpeeds {
 impl WheelSpeeds {
     /// Both wheels through the same function.
     pub fn map(self, f: impl Fn(f64) -> f64) -> Self {
-        Self { left_m_s: f(self.left_m_s), right_m_s: f(self.right_m_s) }
+        Self {
+            left_m_s: f(self.left_m_s),
+            right_m_s: f(self.right_m_s),
+        }
     }
 }
 
@@ -40,7 +43,10 @@ pub struct Pose {
 impl Pose {
     /// The pose at `(x, y)` in metres that looks along `heading_rad`, counter-clockwise from +x.
     pub fn new(x_m: f64, y_m: f64, heading_rad: f64) -> Self {
-        Self { position: Vec2::new(x_m, y_m), heading: Vec2::new(heading_rad.cos(), heading_rad.sin()) }
+        Self {
+            position: Vec2::new(x_m, y_m),
+            heading: Vec2::new(heading_rad.cos(), heading_rad.sin()),
+        }
     }
 
     /// The heading in (-pi, pi], rad.
@@ -76,7 +82,10 @@ impl Pose {
         let heading = turn(along, cos, sin);
         // One Newton step towards unit length keeps the rounding of a million steps below 1e-15.
         let heading = heading * (1.5 - 0.5 * heading.length_squared());
-        Self { position: self.position + along * chord, heading }
+        Self {
+            position: self.position + along * chord,
+            heading,
+        }
     }
 }
 
@@ -101,7 +110,8 @@ fn sin_cos_sinc(x: f64) -> (f64, f64, f64) {
         + q4 * ((1.0 / 362_880.0 - q * (1.0 / 39_916_800.0)) + q2 * (1.0 / 6_227_020_800.0));
     let cos = (1.0 - q * 0.5)
         + q2 * (1.0 / 24.0 - q * (1.0 / 720.0))
-        + q4 * ((1.0 / 40_320.0 - q * (1.0 / 3_628_800.0)) + q2 * (1.0 / 479_001_600.0 - q * (1.0 / 87_178_291_200.0)));
+        + q4 * ((1.0 / 40_320.0 - q * (1.0 / 3_628_800.0))
+            + q2 * (1.0 / 479_001_600.0 - q * (1.0 / 87_178_291_200.0)));
     (x * sinc, cos, sinc)
 }
 
@@ -143,11 +153,18 @@ impl Robot {
 mod tests {
     use super::*;
 
-    const E_PUCK: Robot = Robot { body_radius_m: 0.037, axle_m: 0.053, wheel_speed_limit_m_s: 0.1288 };
+    const E_PUCK: Robot = Robot {
+        body_radius_m: 0.037,
+        axle_m: 0.053,
+        wheel_speed_limit_m_s: 0.1288,
+    };
 
     #[test]
     fn constant_wheel_speeds_close_a_circle() {
-        let wheels = WheelSpeeds { left_m_s: 0.04, right_m_s: 0.06 };
+        let wheels = WheelSpeeds {
+            left_m_s: 0.04,
+            right_m_s: 0.06,
+        };
         let start = Pose::new(0.3, -0.2, 0.7);
         let period_s = std::f64::consts::TAU / E_PUCK.twist(wheels).yaw_rad_s;
         let end = (0..1000).fold(start, |pose, _| E_PUCK.roll(pose, wheels, period_s / 1000.0));
@@ -157,8 +174,16 @@ mod tests {
 
     #[test]
     fn one_arc_is_two_half_arcs() {
-        for (left, right) in [(0.05, 0.05), (-0.05, 0.05), (0.1288, -0.02), (0.01, 0.010_000_001)] {
-            let wheels = WheelSpeeds { left_m_s: left, right_m_s: right };
+        for (left, right) in [
+            (0.05, 0.05),
+            (-0.05, 0.05),
+            (0.1288, -0.02),
+            (0.01, 0.010_000_001),
+        ] {
+            let wheels = WheelSpeeds {
+                left_m_s: left,
+                right_m_s: right,
+            };
             let start = Pose::new(0.0, 0.0, 1.0);
             let whole = E_PUCK.roll(start, wheels, 0.064);
             let halves = E_PUCK.roll(E_PUCK.roll(start, wheels, 0.032), wheels, 0.032);
@@ -172,21 +197,40 @@ mod tests {
         for i in -1000..=1000 {
             let x = f64::from(i) * 0.000_25;
             let (sin, cos, sinc) = sin_cos_sinc(x);
-            assert!((sin - x.sin()).abs() < 2e-16 && (cos - x.cos()).abs() < 2e-16, "{x}");
+            assert!(
+                (sin - x.sin()).abs() < 2e-16 && (cos - x.cos()).abs() < 2e-16,
+                "{x}"
+            );
             assert!(x == 0.0 || (sinc - x.sin() / x).abs() < 3e-16, "{x}");
         }
     }
 
     #[test]
     fn the_right_wheel_turns_the_robot_left() {
-        let pose = E_PUCK.roll(Pose::new(0.0, 0.0, 0.0), WheelSpeeds { left_m_s: 0.04, right_m_s: 0.06 }, 0.064);
+        let pose = E_PUCK.roll(
+            Pose::new(0.0, 0.0, 0.0),
+            WheelSpeeds {
+                left_m_s: 0.04,
+                right_m_s: 0.06,
+            },
+            0.064,
+        );
         assert!(pose.heading_rad() > 0.0 && pose.position.y > 0.0, "{pose:?}");
     }
 
     #[test]
     fn the_heading_stays_a_unit_vector() {
-        let wheels = WheelSpeeds { left_m_s: 0.031, right_m_s: 0.064 };
-        let end = (0..1_000_000).fold(Pose::new(0.0, 0.0, 0.0), |pose, _| E_PUCK.roll(pose, wheels, 0.032));
-        assert!((end.heading.length() - 1.0).abs() < 1e-15, "{}", end.heading.length());
+        let wheels = WheelSpeeds {
+            left_m_s: 0.031,
+            right_m_s: 0.064,
+        };
+        let end = (0..1_000_000).fold(Pose::new(0.0, 0.0, 0.0), |pose, _| {
+            E_PUCK.roll(pose, wheels, 0.032)
+        });
+        assert!(
+            (end.heading.length() - 1.0).abs() < 1e-15,
+            "{}",
+            end.heading.length()
+        );
     }
 }

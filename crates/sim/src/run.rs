@@ -415,7 +415,12 @@ pub fn drive(
     if !timed_out {
         (0..SPARE_STEPS).for_each(|_| record(&run.step()));
     }
-    Ok(Drive { laps: kept, contacts, timed_out, steps })
+    Ok(Drive {
+        laps: kept,
+        contacts,
+        timed_out,
+        steps,
+    })
 }
 
 /// Steps recorded after the last lap has closed, so that it also closes in a file whose positions are rounded.

@@ -108,7 +108,13 @@ impl Scene {
         let walls = Walls::new(&outer, &inner, self.rules.thickness_m);
         let declared = Arc::new(Geometry::new(walls, self.kind, &model.machine));
         let range_m = model.machine.range_m;
-        Self { outer, inner, range_m, declared, ..self.clone() }
+        Self {
+            outer,
+            inner,
+            range_m,
+            declared,
+            ..self.clone()
+        }
     }
 
     /// The corners at which the walls are cut: the outer wall's and the inner wall's.

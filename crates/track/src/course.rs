@@ -211,12 +211,7 @@ fn sides<'w>(direction: Direction, outer: &'w Wall, inner: &'w Wall) -> Walls<'w
     }
 }
 
-fn check_wall(
-    wall: &Wall,
-    chords: &[Segment],
-    arena_m: [f64; 2],
-    declared: Direction,
-) -> Result<(), Error> {
+fn check_wall(wall: &Wall, chords: &[Segment], arena_m: [f64; 2], declared: Direction) -> Result<(), Error> {
     let inside = |p: Vec2| (0.0..=arena_m[0]).contains(&p.x) && (0.0..=arena_m[1]).contains(&p.y);
     if let Some(&(at_m, _)) = chords.iter().find(|(p, _)| !inside(*p)) {
         return Err(Error::OutsideArena {
@@ -239,11 +234,7 @@ fn check_wall(
     Ok(())
 }
 
-fn check_corridor(
-    outer: &Wall,
-    outer_chords: &[Segment],
-    inner_chords: &[Segment],
-) -> Result<(), Error> {
+fn check_corridor(outer: &Wall, outer_chords: &[Segment], inner_chords: &[Segment]) -> Result<(), Error> {
     let of_outer = outer_chords.len();
     let both = [outer_chords, inner_chords].concat();
     if let Some((_, _, at_m)) = crossing(&both, |i, j| i < of_outer && j >= of_outer) {
@@ -261,9 +252,8 @@ fn check_corridor(
 
 /// Whether a ray from `p` along +x crosses the closed line an odd number of times.
 fn encloses(line: &[Segment], p: Vec2) -> bool {
-    let crossed = |(a, b): &&Segment| {
-        (a.y > p.y) != (b.y > p.y) && p.x < a.x + (p.y - a.y) * (b.x - a.x) / (b.y - a.y)
-    };
+    let crossed =
+        |(a, b): &&Segment| (a.y > p.y) != (b.y > p.y) && p.x < a.x + (p.y - a.y) * (b.x - a.x) / (b.y - a.y);
     line.iter().filter(crossed).count() % 2 == 1
 }
 
@@ -346,11 +336,7 @@ impl WallEntry {
         let splines = self.spline.iter().map(spline).collect::<Result<_, _>>()?;
         Wall::new(self.name.get_ref(), splines).map_err(|what| {
             let entry = what.spline().and_then(|number| self.spline.get(number - 1));
-            at(
-                text,
-                Some(entry.map_or(self.name.span().start, start_of)),
-                what,
-            )
+            at(text, Some(entry.map_or(self.name.span().start, start_of)), what)
         })
     }
 }
@@ -396,9 +382,7 @@ mod tests {
     }
 
     fn round(name: &str, radius_m: f64) -> Wall {
-        ring_through(name, 4, |index| {
-            on_ellipse([radius_m; 2], index as f64 / 20.0)
-        })
+        ring_through(name, 4, |index| on_ellipse([radius_m; 2], index as f64 / 20.0))
     }
 
     fn course(outer: Wall, inner: Wall) -> Result<Course, Error> {
@@ -408,10 +392,7 @@ mod tests {
     #[test]
     fn circuit_is_as_its_file_says() {
         let course = circuit();
-        assert_eq!(
-            (course.name.as_str(), course.arena_m),
-            ("roduit2007", [1.4, 1.2])
-        );
+        assert_eq!((course.name.as_str(), course.arena_m), ("roduit2007", [1.4, 1.2]));
         assert_eq!(course.wall(Side::Outer).splines().len(), 4);
         assert_eq!(course.wall(Side::Inner).name(), Side::Inner.name());
         assert_eq!(course.way(Direction::Clockwise), Way::Forward);
@@ -420,11 +401,7 @@ mod tests {
 
     #[test]
     fn errors_of_the_file_carry_its_line() {
-        let line = |needle: &str| {
-            1 + CIRCUIT[..CIRCUIT.find(needle).unwrap()]
-                .matches('\n')
-                .count()
-        };
+        let line = |needle: &str| 1 + CIRCUIT[..CIRCUIT.find(needle).unwrap()].matches('\n').count();
         let points = line("[[1.29205");
         let message = refusal("[[1.29205", "[[1.30205");
         let mend = "let spline 2 start at [1.29205, 0.69505]";
@@ -482,19 +459,11 @@ mod tests {
     fn refuses_walls_without_a_corridor() {
         let crossing = course(
             round("outer", 0.5),
-            ring_through("inner", 4, |index| {
-                on_ellipse([0.3, 0.6], index as f64 / 20.0)
-            }),
+            ring_through("inner", 4, |index| on_ellipse([0.3, 0.6], index as f64 / 20.0)),
         );
-        assert!(
-            matches!(crossing, Err(Error::WallsTouch { .. })),
-            "{crossing:?}"
-        );
+        assert!(matches!(crossing, Err(Error::WallsTouch { .. })), "{crossing:?}");
         let touching = course(round("outer", 0.5), round("inner", 0.4995));
-        assert!(
-            matches!(touching, Err(Error::WallsTouch { .. })),
-            "{touching:?}"
-        );
+        assert!(matches!(touching, Err(Error::WallsTouch { .. })), "{touching:?}");
         let swapped = course(round("outer", 0.3), round("inner", 0.5));
         assert!(matches!(swapped, Err(Error::NotInside)), "{swapped:?}");
     }
@@ -507,14 +476,7 @@ mod tests {
             })
         };
         let (outer, inner) = (against("outer", 0.5), against("inner", 0.3));
-        let course = Course::new(
-            "round",
-            [2.0, 2.0],
-            Direction::CounterClockwise,
-            outer,
-            inner,
-        )
-        .unwrap();
+        let course = Course::new("round", [2.0, 2.0], Direction::CounterClockwise, outer, inner).unwrap();
         let gates = course.gates(64).unwrap();
         let inwards = Vec2::ONE - gates[0].center;
         assert!(gates[0].left.dot(inwards) > 0.0, "left is inside");

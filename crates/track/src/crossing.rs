@@ -24,9 +24,7 @@ pub(crate) fn crossing(
     let right = |i: usize| segments[i].0.x.max(segments[i].1.x);
     order.sort_by(|&i, &j| left(i).total_cmp(&left(j)).then(i.cmp(&j)));
     for (rank, &i) in order.iter().enumerate() {
-        let beside = order[rank + 1..]
-            .iter()
-            .take_while(|&&j| left(j) <= right(i));
+        let beside = order[rank + 1..].iter().take_while(|&&j| left(j) <= right(i));
         for &j in beside {
             let (first, second) = (i.min(j), i.max(j));
             if counts(first, second)

@@ -148,9 +148,7 @@ pub enum Error {
         at_m: Vec2,
     },
     /// The inner wall is not inside the outer wall.
-    #[error(
-        "the inner wall lies outside the outer wall; swap their names or move the inner wall inside"
-    )]
+    #[error("the inner wall lies outside the outer wall; swap their names or move the inner wall inside")]
     NotInside,
     /// The midline could not be followed.
     #[error(
@@ -180,9 +178,7 @@ pub enum Error {
         segments: usize,
     },
     /// Too few gates to follow the bends of the corridor.
-    #[error(
-        "{count} gates are too few: the midline bends too much from one to the next; take more"
-    )]
+    #[error("{count} gates are too few: the midline bends too much from one to the next; take more")]
     FewGates {
         /// What was asked for.
         count: usize,

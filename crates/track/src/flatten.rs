@@ -150,11 +150,7 @@ fn deviation_m(wall: &Wall, (from, to): (f64, f64), chord: Segment) -> f64 {
     let mut span = from as usize;
     while (span as f64) < to {
         let (low, high) = ((from - span as f64).max(0.0), (to - span as f64).min(1.0));
-        largest_sq = largest_sq.max(span_deviation_sq(
-            &wall.spans()[span % count],
-            (low, high),
-            chord,
-        ));
+        largest_sq = largest_sq.max(span_deviation_sq(&wall.spans()[span % count], (low, high), chord));
         span += 1;
     }
     largest_sq.sqrt()
@@ -165,8 +161,7 @@ fn deviation_m(wall: &Wall, (from, to): (f64, f64), chord: Segment) -> f64 {
 fn span_deviation_sq(cubic: &Cubic, (low, high): (f64, f64), chord: Segment) -> f64 {
     let along = chord.1 - chord.0;
     let distance_sq = |u: f64| segment_distance_sq(cubic.point(u), chord);
-    let beside =
-        |u: f64| (0.0..=along.length_squared()).contains(&(cubic.point(u) - chord.0).dot(along));
+    let beside = |u: f64| (0.0..=along.length_squared()).contains(&(cubic.point(u) - chord.0).dot(along));
     let mut largest_sq = distance_sq(low).max(distance_sq(high));
     cubic_extrema(cubic.coordinate(chord.0, along.perp()), |u| {
         if u > low && u < high {
@@ -194,20 +189,10 @@ mod tests {
     #[test]
     fn circuit_has_the_papers_counts() {
         let course = circuit();
-        for (error_m, outer, inner) in [
-            (0.001, 61, 44),
-            (0.005, 27, 20),
-            (0.01, 20, 13),
-            (0.05, 9, 6),
-        ] {
+        for (error_m, outer, inner) in [(0.001, 61, 44), (0.005, 27, 20), (0.01, 20, 13), (0.05, 9, 6)] {
             for (wall, count) in [(&course.outer, outer), (&course.inner, inner)] {
                 let chain = wall.flatten(error_m).unwrap();
-                assert_eq!(
-                    chain.vertices.len(),
-                    count,
-                    "{} wall, {error_m} m",
-                    wall.name()
-                );
+                assert_eq!(chain.vertices.len(), count, "{} wall, {error_m} m", wall.name());
                 let measured_m = chain.measured_error_m(wall);
                 assert!(
                     (measured_m / error_m - 1.0).abs() < 1e-9,
@@ -225,11 +210,7 @@ mod tests {
         assert!(chain.vertices.is_sorted_by(|a, b| a.fraction < b.fraction));
         for vertex in &chain.vertices {
             assert!(wall.point(vertex.fraction).distance(vertex.position) < 1e-12);
-            assert!(
-                wall.left_normal(vertex.fraction)
-                    .distance(vertex.left_normal)
-                    < 1e-9
-            );
+            assert!(wall.left_normal(vertex.fraction).distance(vertex.left_normal) < 1e-9);
         }
     }
 
@@ -250,38 +231,26 @@ mod tests {
     fn measured_error_agrees_with_points_looked_at_one_by_one() {
         let wall = circuit().inner;
         let mut chain = wall.flatten(0.01).unwrap();
-        let (measured_m, sampled_m) = (
-            chain.measured_error_m(&wall),
-            sampled_error_m(&chain, &wall),
-        );
+        let (measured_m, sampled_m) = (chain.measured_error_m(&wall), sampled_error_m(&chain, &wall));
         assert!(
             (measured_m - sampled_m).abs() < 1e-7,
             "{measured_m} and {sampled_m}"
         );
         chain.vertices[4].position += Vec2::new(0.004, 0.02); // a moved vertex is measured where it is
-        let (measured_m, sampled_m) = (
-            chain.measured_error_m(&wall),
-            sampled_error_m(&chain, &wall),
-        );
+        let (measured_m, sampled_m) = (chain.measured_error_m(&wall), sampled_error_m(&chain, &wall));
         let step_m = wall.length_m() / 20_000.0; // the largest distance is that of the vertex itself
         assert!(
             (measured_m - sampled_m).abs() < step_m,
             "{measured_m} and {sampled_m}"
         );
-        assert!(
-            (measured_m - 0.004_f64.hypot(0.02)).abs() < 1e-9,
-            "{measured_m}"
-        );
+        assert!((measured_m - 0.004_f64.hypot(0.02)).abs() < 1e-9, "{measured_m}");
     }
 
     #[test]
     fn refuses_errors_that_leave_nothing() {
         let wall = circuit().inner;
         for bad in [0.0, -0.01, f64::NAN, f64::INFINITY] {
-            assert!(
-                matches!(wall.flatten(bad), Err(Error::MaxError { .. })),
-                "{bad}"
-            );
+            assert!(matches!(wall.flatten(bad), Err(Error::MaxError { .. })), "{bad}");
         }
         let message = wall.flatten(2.0).unwrap_err().to_string();
         assert_eq!(

@@ -68,21 +68,14 @@ pub struct Gates {
 }
 
 impl Gates {
-    pub(crate) fn new(
-        midline: &Midline,
-        walls: Walls<'_>,
-        joint: Vec2,
-        count: usize,
-    ) -> Result<Self, Error> {
+    pub(crate) fn new(midline: &Midline, walls: Walls<'_>, joint: Vec2, count: usize) -> Result<Self, Error> {
         if count < 3 {
             return Err(Error::FewGates { count });
         }
         let start_m = midline.nearest_m(walls, joint)?;
         let gate = |index: usize| {
             let along_m = start_m + midline.length_m() * index as f64 / count as f64;
-            midline
-                .at(walls, along_m)
-                .map(|station| walls.gate(&station))
+            midline.at(walls, along_m).map(|station| walls.gate(&station))
         };
         let gates = (0..count).map(gate).collect::<Result<Arc<[_]>, _>>()?;
         check(&gates)?;
@@ -196,16 +189,10 @@ mod tests {
         assert!((gates.midline_length_m() - 3.2480).abs() < 5e-5);
         assert_eq!(text.lines().count(), 101);
         for (line, gate) in text.lines().skip(1).zip(&gates) {
-            let row: Vec<f64> = line
-                .split(',')
-                .map(|value| value.parse().unwrap())
-                .collect();
+            let row: Vec<f64> = line.split(',').map(|value| value.parse().unwrap()).collect();
             let center_m = gate.center.distance(Vec2::new(row[1], row[2]));
             let left = gate.left.distance(Vec2::new(row[3], row[4]));
-            assert!(
-                center_m < 1e-4 && left < 1e-3,
-                "{line}: {center_m} m, {left} off"
-            );
+            assert!(center_m < 1e-4 && left < 1e-3, "{line}: {center_m} m, {left} off");
             assert!(
                 (gate.left_m - row[5]).abs() < 1e-4,
                 "{line}: left {}",

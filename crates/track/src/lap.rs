@@ -223,13 +223,7 @@ impl LapTracker {
     }
 
     /// Takes the samples of the gates after `cell` up to `next` that the straight line crosses.
-    fn cross_between(
-        &mut self,
-        cell: i64,
-        next: i64,
-        from: (f64, Vec2),
-        to: (f64, Vec2),
-    ) -> Option<Lap> {
+    fn cross_between(&mut self, cell: i64, next: i64, from: (f64, Vec2), to: (f64, Vec2)) -> Option<Lap> {
         let mut closed = None;
         let mut reached = 0.0;
         for index in cell + 1..=next {
@@ -290,10 +284,7 @@ impl LapTracker {
             ..Lap::new(self.gates.len())
         };
         let closed = self.lap.replace(next);
-        closed.map(|lap| Lap {
-            end_s: time_s,
-            ..lap
-        })
+        closed.map(|lap| Lap { end_s: time_s, ..lap })
     }
 
     fn count(&self) -> i64 {
@@ -344,11 +335,7 @@ mod tests {
 
     /// Gates passed by the straight line between a point 4 mm before and one 4 mm beyond each; one second a gate,
     /// starting half a second before the first.
-    fn path(
-        gates: &Gates,
-        way: Way,
-        passes: impl Iterator<Item = (usize, f64)>,
-    ) -> Vec<(f64, Vec2)> {
+    fn path(gates: &Gates, way: Way, passes: impl Iterator<Item = (usize, f64)>) -> Vec<(f64, Vec2)> {
         let pass = |(step, (gate, offset_m)): (usize, (usize, f64))| {
             let time_s = step as f64;
             [(time_s - 0.2, -0.004), (time_s + 0.2, 0.004)]
@@ -516,19 +503,13 @@ mod tests {
     fn missed_gate_0_spoils_both_laps() {
         let gates = gates();
         let offset_m = |step: usize| {
-            if step == N {
-                gates[0].left_m + 0.01
-            } else {
-                0.0
-            }
+            if step == N { gates[0].left_m + 0.01 } else { 0.0 }
         };
         let passes = (0..=3 * N).map(|step| (step, offset_m(step)));
         let laps = laps(&gates, Way::Forward, &path(&gates, Way::Forward, passes));
         assert_eq!(laps.len(), 3);
         assert_eq!((&laps[0].missed, &laps[1].missed), (&vec![0], &vec![0]));
-        assert!(
-            laps[0].end_s.is_nan() && laps[1].start_s.is_nan() && laps[1].offsets_m[0].is_nan()
-        );
+        assert!(laps[0].end_s.is_nan() && laps[1].start_s.is_nan() && laps[1].offsets_m[0].is_nan());
         assert!(laps[2].closed().is_ok());
     }
 
@@ -536,9 +517,8 @@ mod tests {
     fn turning_round_and_back_samples_each_gate_once() {
         let gates = gates();
         let mut tracker = LapTracker::new(&gates, Way::Forward);
-        let middle = |gate: usize| {
-            gates[gate % N].center + 0.5 * gates.spacing_m() * gates[gate % N].forward()
-        };
+        let middle =
+            |gate: usize| gates[gate % N].center + 0.5 * gates.spacing_m() * gates[gate % N].forward();
         let there = 95..160;
         let back = (120..160).rev();
         let on = 120..=200;
@@ -561,9 +541,8 @@ mod tests {
     fn a_lap_backwards_is_no_debt() {
         let gates = gates();
         let mut tracker = LapTracker::new(&gates, Way::Forward);
-        let middle = |gate: usize| {
-            gates[gate % N].center + 0.5 * gates.spacing_m() * gates[gate % N].forward()
-        };
+        let middle =
+            |gate: usize| gates[gate % N].center + 0.5 * gates.spacing_m() * gates[gate % N].forward();
         let steps = (350..=499).rev().chain(350..=501);
         let laps = steps
             .enumerate()

@@ -106,9 +106,7 @@ impl Midline {
         let (mut stations, mut here, mut step_m) = (vec![start], start, STEP_M);
         loop {
             let home = start.point - here.point;
-            let closes = stations.len() > 2
-                && home.dot(here.forward()) > 0.0
-                && home.length() < 1.5 * step_m;
+            let closes = stations.len() > 2 && home.dot(here.forward()) > 0.0 && home.length() < 1.5 * step_m;
             let mut next = if closes {
                 start
             } else {
@@ -175,10 +173,7 @@ impl Midline {
             .iter()
             .min_by(|a, b| distance_sq(a).total_cmp(&distance_sq(b)))
             .expect("the march starts with a station");
-        let (mut low, mut high) = (
-            nearest.along_m - 1.5 * STEP_M,
-            nearest.along_m + 1.5 * STEP_M,
-        );
+        let (mut low, mut high) = (nearest.along_m - 1.5 * STEP_M, nearest.along_m + 1.5 * STEP_M);
         while high - low > 1e-11 {
             let middle = 0.5 * (low + high);
             let station = self.at(walls, middle)?;
@@ -233,8 +228,7 @@ mod tests {
         let midline = Midline::new(walls).unwrap();
         let step_m = midline.length_m() / 3000.0;
         for i in 0..3000 {
-            let [here, there] =
-                [i, i + 1].map(|i| midline.at(walls, f64::from(i) * step_m).unwrap());
+            let [here, there] = [i, i + 1].map(|i| midline.at(walls, f64::from(i) * step_m).unwrap());
             let (arc_m, turn_rad) = here.step_to(&there);
             assert!(
                 (arc_m - step_m).abs() < 1e-8,

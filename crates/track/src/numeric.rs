@@ -48,12 +48,7 @@ pub(crate) fn cubic_extrema(c: [f64; 4], visit: impl FnMut(f64)) {
 /// Calls `visit` with every sign change of the cubic `c0 + c1 u + c2 u^2 + c3 u^3` in [0, 1], rising.
 pub(crate) fn cubic_roots(c: [f64; 4], mut visit: impl FnMut(f64)) {
     let end = c[0] + c[1] + c[2] + c[3];
-    let hull = [
-        c[0],
-        c[0] + c[1] / 3.0,
-        c[0] + (2.0 * c[1] + c[2]) / 3.0,
-        end,
-    ];
+    let hull = [c[0], c[0] + c[1] / 3.0, c[0] + (2.0 * c[1] + c[2]) / 3.0, end];
     if hull.iter().all(|&y| y > 0.0) || hull.iter().all(|&y| y < 0.0) {
         return;
     }

@@ -155,12 +155,7 @@ mod tests {
         for pair in bent().spans().windows(2) {
             assert!(pair[0].point(1.0).distance(pair[1].point(0.0)) < 1e-15);
             assert!(pair[0].velocity(1.0).distance(pair[1].velocity(0.0)) < 1e-15);
-            assert!(
-                pair[0]
-                    .acceleration(1.0)
-                    .distance(pair[1].acceleration(0.0))
-                    < 1e-15
-            );
+            assert!(pair[0].acceleration(1.0).distance(pair[1].acceleration(0.0)) < 1e-15);
         }
     }
 

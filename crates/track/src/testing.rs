@@ -38,10 +38,7 @@ pub(crate) fn ring_through(name: &str, splines: usize, at: impl Fn(usize) -> Vec
 /// A point of an ellipse about (1, 1), clockwise, `turn` in [0, 1).
 pub(crate) fn on_ellipse(radii_m: [f64; 2], turn: f64) -> Vec2 {
     let angle = -std::f64::consts::TAU * turn;
-    Vec2::new(
-        1.0 + radii_m[0] * angle.cos(),
-        1.0 + radii_m[1] * angle.sin(),
-    )
+    Vec2::new(1.0 + radii_m[0] * angle.cos(), 1.0 + radii_m[1] * angle.sin())
 }
 
 /// Closed smooth walls: ellipses whose points are moved in and out by up to a tenth.
@@ -62,10 +59,7 @@ pub(crate) fn corridor() -> impl Strategy<Value = Course> {
         let wall = |name: &str, inset_m: f64, bumps: &[f64]| {
             ring_through(name, 4, |index| {
                 let turn = index as f64 / (STEPS * 4) as f64;
-                on_ellipse(
-                    radii_m.map(|radius_m| radius_m - inset_m + bumps[index]),
-                    turn,
-                )
+                on_ellipse(radii_m.map(|radius_m| radius_m - inset_m + bumps[index]), turn)
             })
         };
         let (outer, inner) = (wall("outer", 0.0, &outer), wall("inner", 0.15, &inner));

@@ -100,8 +100,7 @@ impl Wall {
         let cubic = self.spans[span];
         let [from, middle, to] = [0.0, 0.5, 1.0].map(|part| (index as f64 + part) / PIECES as f64);
         let [before, after] = [from, to].map(|u| cubic.velocity(u));
-        if !(before.dot(after) > 0.0 && before.length_squared().min(after.length_squared()) > 1e-14)
-        {
+        if !(before.dot(after) > 0.0 && before.length_squared().min(after.length_squared()) > 1e-14) {
             let (wall, spline) = (self.name.clone(), self.spline_of(span));
             return Err(Error::Cusp {
                 wall,
@@ -209,9 +208,7 @@ impl Wall {
     /// Span and parameter at a fraction of the arc length.
     fn place(&self, fraction: f64) -> (usize, f64) {
         let along_m = (fraction - fraction.floor()) * self.length_m;
-        let later = self
-            .pieces
-            .partition_point(|piece| piece.start_m <= along_m);
+        let later = self.pieces.partition_point(|piece| piece.start_m <= along_m);
         let piece = self.pieces[later.saturating_sub(1)];
         let cubic = self.spans[piece.span];
         let rest_m = (along_m - piece.start_m).min(piece.length_m);
@@ -230,11 +227,7 @@ impl Wall {
         let (piece, cubic) = (&self.pieces[index], &self.spans[span]);
         let along_m = piece.start_m + integral(piece.from, u, |u| cubic.velocity(u).length());
         let fraction = along_m / self.length_m;
-        if fraction < 1.0 {
-            fraction.max(0.0)
-        } else {
-            0.0
-        }
+        if fraction < 1.0 { fraction.max(0.0) } else { 0.0 }
     }
 
     /// The parameter that counts spans from the first joint, at a fraction of the arc length.
@@ -403,11 +396,7 @@ mod tests {
         let along = |distance_m: f64| wall.point(distance_m / wall.length_m());
         for distance_m in [0.0, 0.125, 0.3, 0.99] {
             assert!(along(distance_m).distance(Vec2::new(distance_m, 1.0)) < 1e-14);
-            assert!(
-                wall.left_normal(distance_m / wall.length_m())
-                    .distance(Vec2::Y)
-                    < 1e-15
-            );
+            assert!(wall.left_normal(distance_m / wall.length_m()).distance(Vec2::Y) < 1e-15);
         }
         let opposite = 0.5 + 0.25 / wall.length_m();
         assert!(wall.point(opposite).distance(Vec2::new(0.75, 0.0)) < 1e-12);
@@ -423,10 +412,7 @@ mod tests {
             (nearest.fraction * wall.length_m() - 0.3).abs() < 1e-12,
             "{nearest:?}"
         );
-        assert!(
-            nearest.point.distance(Vec2::new(0.3, 1.0)) < 1e-12,
-            "{nearest:?}"
-        );
+        assert!(nearest.point.distance(Vec2::new(0.3, 1.0)) < 1e-12, "{nearest:?}");
     }
 
     #[test]
@@ -458,8 +444,7 @@ mod tests {
     #[test]
     fn names_the_spline_that_does_not_fit() {
         let mut splines = stadium().splines().to_vec();
-        splines[2] =
-            Spline::new(vec![Vec2::new(1.0, -0.01), Vec2::new(0.5, 0.0), Vec2::ZERO]).unwrap();
+        splines[2] = Spline::new(vec![Vec2::new(1.0, -0.01), Vec2::new(0.5, 0.0), Vec2::ZERO]).unwrap();
         let gap = Wall::new("outer", splines.clone()).unwrap_err().to_string();
         let expected = "outer wall: spline 2 ends 0.010000 m away from where spline 3 starts; \
                         let spline 3 start at [1.00000, 0.00000]";
@@ -482,10 +467,7 @@ mod tests {
             ),
             "{open}"
         );
-        assert!(matches!(
-            Wall::new("outer", vec![]),
-            Err(Error::NoSplines { .. })
-        ));
+        assert!(matches!(Wall::new("outer", vec![]), Err(Error::NoSplines { .. })));
     }
 
     #[test]
@@ -538,9 +520,7 @@ mod tests {
     #[test]
     fn nearest_is_exact_where_it_is_about_to_jump() {
         // near the centre of a ring the nearest point could be anywhere
-        let wall = ring_through("round", 4, |index| {
-            on_ellipse([0.1, 0.1], index as f64 / 20.0)
-        });
+        let wall = ring_through("round", 4, |index| on_ellipse([0.1, 0.1], index as f64 / 20.0));
         for (x, y) in [(1.0, 1.0), (1.001, 1.0), (0.999, 1.002), (1.01, 1.01)] {
             assert_nearest(&wall, Vec2::new(x, y));
         }

@@ -13,7 +13,12 @@ use crate::session::Session;
 use crate::table::Table;
 
 pub(crate) fn run(session: &Session, args: &Bench) -> Result<()> {
-    let Bench::Rays { segments, seeds, json, out } = args;
+    let Bench::Rays {
+        segments,
+        seeds,
+        json,
+        out,
+    } = args;
     let measured = Measurements::load(&[])?;
     let config = measured.standard()?;
     let progress = session.progress("casting rays", 3 * segments.len() as u64);
@@ -34,7 +39,11 @@ pub(crate) fn run(session: &Session, args: &Bench) -> Result<()> {
     if let Some(out) = out {
         write(session, out, args, &rows, &rungs, &document)?;
     }
-    if *json { session.print_json(&document) } else { session.print(&text(&rows, &cone, &rungs, &document)) }
+    if *json {
+        session.print_json(&document)
+    } else {
+        session.print(&text(&rows, &cone, &rungs, &document))
+    }
 }
 
 fn write(
@@ -55,14 +64,28 @@ fn write(
 }
 
 fn text(rows: &[Row], cone: &[(usize, [f64; 2])], rungs: &[Rung], document: &serde_json::Value) -> String {
-    let mut cost = Table::new("Nanoseconds, quickest of several passes", &[
-        "segments", "max error, mm", "8 rays: loop", "BVH", "lapwing", "step: loop", "BVH", "lapwing",
-    ]);
+    let mut cost = Table::new(
+        "Nanoseconds, quickest of several passes",
+        &[
+            "segments",
+            "max error, mm",
+            "8 rays: loop",
+            "BVH",
+            "lapwing",
+            "step: loop",
+            "BVH",
+            "lapwing",
+        ],
+    );
     for row in rows {
         let cells = ["brute", "bvh", "default"].map(|name| format!("{:.0}", row.ns_per_reading[name]));
         let steps = ["brute", "bvh", "default"].map(|name| format!("{:.0}", row.ns_per_step[name]));
         let error_mm = 1000.0 * row.max_error_m;
-        let error = if error_mm < 0.01 { format!("{error_mm:.1e}") } else { format!("{error_mm:.3}") };
+        let error = if error_mm < 0.01 {
+            format!("{error_mm:.1e}")
+        } else {
+            format!("{error_mm:.3}")
+        };
         let first = [row.segments.to_string(), error];
         cost.push(first.into_iter().chain(cells).chain(steps));
     }
@@ -80,11 +103,26 @@ fn text(rows: &[Row], cone: &[(usize, [f64; 2])], rungs: &[Rung], document: &ser
             slope("default", "ns_per_tenfold"),
         );
     }
-    let mut rays = Table::new("\nA control step with a cone of rays at each sensor, ns", &["rays", "responses averaged", "distances averaged"]);
+    let mut rays = Table::new(
+        "\nA control step with a cone of rays at each sensor, ns",
+        &["rays", "responses averaged", "distances averaged"],
+    );
     for (count, [responses, distances]) in cone {
-        rays.push([count.to_string(), format!("{responses:.0}"), format!("{distances:.0}")]);
+        rays.push([
+            count.to_string(),
+            format!("{responses:.0}"),
+            format!("{distances:.0}"),
+        ]);
     }
-    let mut ladder = Table::new("\nFaithfulness against cost", &["max error, mm", "segments", "step, ns", "distance to the measured runs"]);
+    let mut ladder = Table::new(
+        "\nFaithfulness against cost",
+        &[
+            "max error, mm",
+            "segments",
+            "step, ns",
+            "distance to the measured runs",
+        ],
+    );
     for rung in rungs {
         let distance = rung.distance.map_or("too few laps".into(), |d| d.text(2));
         ladder.push([

@@ -23,23 +23,35 @@ use crate::table::{Table, probability};
 
 pub(crate) fn run(session: &Session, args: &Compare) -> Result<()> {
     let modes = parse_modes(&args.modes)?;
-    let clusters = if args.sampled { tables(&args.data)? } else { data_sets(session, args)? };
+    let clusters = if args.sampled {
+        tables(&args.data)?
+    } else {
+        data_sets(session, args)?
+    };
     let pdm = Pdm::fit(&clusters.list)?;
     let document = compare(session, &pdm, &clusters.list, modes, args.permutations)?;
     if let Some(out) = &args.out {
-        let configuration = json!({ "data": args.data, "modes": args.modes, "permutations": args.permutations });
+        let configuration =
+            json!({ "data": args.data, "modes": args.modes, "permutations": args.permutations });
         let folder = OutDir::create(out, &Work::new("compare", &configuration), false)?;
         folder.write("compare.json", format!("{document:#}\n"))?;
         folder.write("pairs.csv", pairs_csv(&document))?;
         if pdm.degrees_of_freedom() >= 2 {
-            folder.write("modes.svg", figures::modes_figure(&pdm, &clusters.list)?.to_svg()?)?;
+            folder.write(
+                "modes.svg",
+                figures::modes_figure(&pdm, &clusters.list)?.to_svg()?,
+            )?;
         }
         if let Some((circuit, runs)) = &clusters.course {
             folder.write("laps.svg", figures::laps_map(circuit, runs).to_svg()?)?;
         }
         folder.finish(&session.manifest(configuration, clusters.inputs))?;
     }
-    if args.json { session.print_json(&document) } else { session.print(&text(&document)) }
+    if args.json {
+        session.print_json(&document)
+    } else {
+        session.print(&text(&document))
+    }
 }
 
 /// What is compared, and where it came from.
@@ -62,7 +74,10 @@ fn parse_modes(text: &str) -> Result<Modes> {
 
 /// Gate tables.
 fn tables(paths: &[PathBuf]) -> Result<Clusters> {
-    let tables: Vec<GateTable> = paths.iter().map(|path| GateTable::load(path)).collect::<Result<_>>()?;
+    let tables: Vec<GateTable> = paths
+        .iter()
+        .map(|path| GateTable::load(path))
+        .collect::<Result<_>>()?;
     for table in &tables[1..] {
         ensure!(
             table.header.len() == tables[0].header.len(),
@@ -103,7 +118,11 @@ fn data_sets(session: &Session, args: &Compare) -> Result<Clusters> {
             );
         }
         let measured = Measured::on(set, Arc::clone(&circuits[&key]))?;
-        measured.runs.iter().flat_map(SampledRun::remarks).for_each(|remark| session.remark(&remark));
+        measured
+            .runs
+            .iter()
+            .flat_map(SampledRun::remarks)
+            .for_each(|remark| session.remark(&remark));
         list.extend(measured.clusters()?);
         inputs.extend(measured.set.inputs);
         runs.extend(measured.runs);
@@ -121,9 +140,17 @@ fn load(path: &Path) -> Result<DataSet> {
     }
 }
 
-fn compare(session: &Session, pdm: &Pdm, clusters: &[Cluster], modes: Modes, permutations: u32) -> Result<Value> {
-    let projections: Vec<pdm::Projection> =
-        clusters.iter().map(|cluster| pdm.project(cluster, modes)).collect::<Result<_, _>>()?;
+fn compare(
+    session: &Session,
+    pdm: &Pdm,
+    clusters: &[Cluster],
+    modes: Modes,
+    permutations: u32,
+) -> Result<Value> {
+    let projections: Vec<pdm::Projection> = clusters
+        .iter()
+        .map(|cluster| pdm.project(cluster, modes))
+        .collect::<Result<_, _>>()?;
     let used = projections.first().map_or(0, |p| p.points().ncols());
     let pair_count = clusters.len() * clusters.len().saturating_sub(1) / 2;
     let progress = session.progress("comparing", pair_count as u64);
@@ -137,7 +164,8 @@ fn compare(session: &Session, pdm: &Pdm, clusters: &[Cluster], modes: Modes, per
                 "f": t.f, "df1": t.df1, "df2": t.df2, "p": t.p,
             });
             if permutations > 0 {
-                let energy = pdm::energy_test(&clusters[i], &clusters[j], permutations as usize, session.seed())?;
+                let energy =
+                    pdm::energy_test(&clusters[i], &clusters[j], permutations as usize, session.seed())?;
                 pair["energy"] = test(&energy);
             }
             pairs.push(pair);
@@ -163,7 +191,9 @@ fn pairs_csv(document: &Value) -> String {
     for pair in document["pairs"].as_array().into_iter().flatten() {
         let names = ["a", "b"].map(|key| pair[key].as_str().unwrap_or("").to_owned());
         let numbers = ["distance", "t2", "f", "df1", "df2", "p"].map(|key| pair[key].to_string());
-        let energy = pair["energy"]["p"].as_f64().map_or(String::new(), |p| p.to_string());
+        let energy = pair["energy"]["p"]
+            .as_f64()
+            .map_or(String::new(), |p| p.to_string());
         csv += &format!("{},{},{energy}\n", names.join(","), numbers.join(","));
     }
     csv
@@ -179,12 +209,20 @@ fn text(document: &Value) -> String {
         .collect();
     let mut text = format!(
         "{} laps in {} clusters, {} gates; variance in the first modes: {}\n\n",
-        document["clusters"].as_array().into_iter().flatten().filter_map(|c| c["laps"].as_u64()).sum::<u64>(),
+        document["clusters"]
+            .as_array()
+            .into_iter()
+            .flatten()
+            .filter_map(|c| c["laps"].as_u64())
+            .sum::<u64>(),
         document["clusters"].as_array().map_or(0, Vec::len),
         document["gates"],
         explained.join(", "),
     );
-    let title = format!("Inter-cluster distances in {} modes (eq. 8), Hotelling's and the energy test", document["modes"]);
+    let title = format!(
+        "Inter-cluster distances in {} modes (eq. 8), Hotelling's and the energy test",
+        document["modes"]
+    );
     let mut table = Table::new(title, &["a", "b", "distance", "T2", "F", "df", "p", "energy p"]);
     for pair in document["pairs"].as_array().into_iter().flatten() {
         let number = |key: &str| pair[key].as_f64().unwrap_or(f64::NAN);

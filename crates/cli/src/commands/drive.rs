@@ -1,6 +1,6 @@
 //! `lapwing drive`: simulated laps as a data set.
 
-use anyhow::{Context, Result};
+use anyhow::Result;
 use rayon::prelude::*;
 use serde_json::{Value, json};
 use sim::{CasterKind, Drive, Step, Streams};
@@ -10,12 +10,12 @@ use crate::args;
 use crate::config::Config;
 use crate::dataset::{DataSetToWrite, Log, Rows, run_name, write_dataset};
 use crate::figures;
+use crate::interrupt;
 use crate::laps::{self, SampledRun, mean_and_deviation};
-use crate::output::{OutDir, Work};
+use crate::output::{OutDir, Work, sha256};
 use crate::session::Session;
 use crate::setup::{self, Setup};
 use crate::table::Table;
-use crate::interrupt;
 
 pub(crate) fn run(session: &Session, args: &args::Drive) -> Result<()> {
     let file = setup::model_file(&args.model)?;
@@ -40,31 +40,46 @@ pub(crate) fn run(session: &Session, args: &args::Drive) -> Result<()> {
         .collect::<Result<_>>()?;
     drop(progress);
 
-    let name = args.out.file_name().context("--out needs the name of a folder")?.to_string_lossy().into_owned();
-    let sampled: Vec<SampledRun> =
-        driven.iter().enumerate().map(|(i, (drive, _))| laps::simulated(&name, i, drive, laps)).collect();
+    let name = args
+        .name
+        .clone()
+        .unwrap_or_else(|| name(&file.config, &configuration));
+    let sampled: Vec<SampledRun> = driven
+        .iter()
+        .enumerate()
+        .map(|(i, (drive, _))| laps::simulated(&name, i, drive, laps))
+        .collect();
     let source = file.world(world)?;
     let shipped = source.path.is_none();
-    let rows: Vec<(String, Rows)> =
-        driven.iter().enumerate().map(|(i, (_, rows))| (run_name(i), rows.clone())).collect();
+    let rows: Vec<(String, Rows)> = driven
+        .iter()
+        .enumerate()
+        .map(|(i, (_, rows))| (run_name(i), rows.clone()))
+        .collect();
     if !shipped {
         out.write("world.toml", &source.text)?;
     }
-    write_dataset(out.path(), &DataSetToWrite {
-        name: &name,
-        world: if shipped { &file.config.world } else { "world.toml" },
-        controller: file.config.controller.kind,
-        laps,
-        note: "simulated by lapwing; model.toml beside this file is the model",
-        declared: &declared(&file.config),
-        runs: &rows,
-    })?;
+    write_dataset(
+        out.path(),
+        &DataSetToWrite {
+            name: &name,
+            world: if shipped { &file.config.world } else { "world.toml" },
+            controller: file.config.controller.kind,
+            laps,
+            note: "simulated by lapwing; model.toml beside this file is the model",
+            declared: &declared(&file.config),
+            runs: &rows,
+        },
+    )?;
     let mut config = file.config.clone();
     if !shipped {
         config.world = "world.toml".into();
     }
     out.write("model.toml", config.to_toml())?;
-    out.write("laps.svg", figures::laps_map(setup.scene.circuit(), &sampled).to_svg()?)?;
+    out.write(
+        "laps.svg",
+        figures::laps_map(setup.scene.circuit(), &sampled).to_svg()?,
+    )?;
     let document = summary(&name, &sampled, &driven);
     out.write("summary.json", format!("{document:#}\n"))?;
     out.finish(&session.manifest(configuration, vec![file.input.clone(), source.input]))?;
@@ -72,26 +87,49 @@ pub(crate) fn run(session: &Session, args: &args::Drive) -> Result<()> {
     for remark in sampled.iter().flat_map(SampledRun::remarks) {
         session.remark(&remark);
     }
-    if args.json { session.print_json(&document) } else { session.print(&text(args, &document)) }
+    if args.json {
+        session.print_json(&document)
+    } else {
+        session.print(&text(args, &document))
+    }
+}
+
+/// The name of a data set that was given none: its controller and what tells it from others, wherever it is written to.
+fn name(config: &Config, configuration: &Value) -> String {
+    let hash = sha256(configuration.to_string().as_bytes());
+    format!("{}-{}", config.controller.kind.name(), &hash[..8])
 }
 
 /// The caster of that name.
 fn caster(name: &str) -> Option<CasterKind> {
-    CasterKind::NAMED.iter().find(|(known, _)| *known == name).map(|(_, kind)| *kind)
+    CasterKind::NAMED
+        .iter()
+        .find(|(known, _)| *known == name)
+        .map(|(_, kind)| *kind)
 }
 
 /// Drives one run and keeps its rows.
 fn record(setup: &Setup, seed: u64, run: usize, laps: usize, log: bool) -> Result<(Drive, Rows)> {
-    let mut rows = Rows { log: log.then(Log::default), ..Rows::default() };
-    let drive = setup.drive(Streams { seed, run: run as u64 }, laps, |step: &Step| {
-        rows.t_s.push(step.time_s);
-        rows.position_m.push(Some([step.observed.x, step.observed.y]));
-        if let Some(log) = &mut rows.log {
-            log.readings.push(step.readings);
-            log.left_m_s.push(step.command.left_m_s);
-            log.right_m_s.push(step.command.right_m_s);
-        }
-    })?;
+    let mut rows = Rows {
+        log: log.then(Log::default),
+        ..Rows::default()
+    };
+    let drive = setup.drive(
+        Streams {
+            seed,
+            run: run as u64,
+        },
+        laps,
+        |step: &Step| {
+            rows.t_s.push(step.time_s);
+            rows.position_m.push(Some([step.observed.x, step.observed.y]));
+            if let Some(log) = &mut rows.log {
+                log.readings.push(step.readings);
+                log.left_m_s.push(step.command.left_m_s);
+                log.right_m_s.push(step.command.right_m_s);
+            }
+        },
+    )?;
     Ok((drive, rows))
 }
 
@@ -101,20 +139,47 @@ fn declared(config: &Config) -> Toml {
     let mut declared = Toml::new();
     let mut put = |table: &str, key: &str, value: toml::Value, usual: toml::Value| {
         if value != usual {
-            let entry = declared.entry(table).or_insert_with(|| toml::Value::Table(Toml::new()));
+            let entry = declared
+                .entry(table)
+                .or_insert_with(|| toml::Value::Table(Toml::new()));
             if let Some(entry) = entry.as_table_mut() {
                 entry.insert(key.to_owned(), value);
             }
         }
     };
     let (now, usual) = (&config.controller, &shipped.controller);
-    put("controller", "speed_m_s", now.speed_m_s.into(), usual.speed_m_s.into());
-    put("controller", "gain_per_count", now.gain_per_count.into(), usual.gain_per_count.into());
-    put("controller", "threshold_counts", now.threshold_counts.into(), usual.threshold_counts.into());
+    put(
+        "controller",
+        "speed_m_s",
+        now.speed_m_s.into(),
+        usual.speed_m_s.into(),
+    );
+    put(
+        "controller",
+        "gain_per_count",
+        now.gain_per_count.into(),
+        usual.gain_per_count.into(),
+    );
+    put(
+        "controller",
+        "threshold_counts",
+        now.threshold_counts.into(),
+        usual.threshold_counts.into(),
+    );
     put("controller", "step_s", now.step_s.into(), usual.step_s.into());
     let (now, usual) = (&config.run, &shipped.run);
-    put("run", "direction", now.direction.name().into(), usual.direction.name().into());
-    put("run", "gates", (now.gates as i64).into(), (usual.gates as i64).into());
+    put(
+        "run",
+        "direction",
+        now.direction.name().into(),
+        usual.direction.name().into(),
+    );
+    put(
+        "run",
+        "gates",
+        (now.gates as i64).into(),
+        (usual.gates as i64).into(),
+    );
     declared
 }
 
@@ -137,7 +202,17 @@ fn finite(x: f64) -> Value {
 }
 
 fn text(args: &args::Drive, document: &Value) -> String {
-    let mut table = Table::new("", &["run", "laps closed", "lap time, s", "s.d., s", "contacts", "ended"]);
+    let mut table = Table::new(
+        "",
+        &[
+            "run",
+            "laps closed",
+            "lap time, s",
+            "s.d., s",
+            "contacts",
+            "ended",
+        ],
+    );
     for run in document["runs"].as_array().into_iter().flatten() {
         let seconds = |value: &Value| value.as_f64().map_or("-".into(), |s| format!("{s:.2}"));
         table.push([
@@ -146,7 +221,11 @@ fn text(args: &args::Drive, document: &Value) -> String {
             seconds(&run["lap_time_s"]),
             seconds(&run["lap_time_deviation_s"]),
             run["contact_steps"].to_string(),
-            if run["timed_out"] == true { "timed out".into() } else { "closed".to_owned() },
+            if run["timed_out"] == true {
+                "timed out".into()
+            } else {
+                "closed".to_owned()
+            },
         ]);
     }
     format!("{}\nwritten to {}\n", table.to_text(), args.out.display())

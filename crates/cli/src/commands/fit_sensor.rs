@@ -23,7 +23,11 @@ pub(crate) fn run(session: &Session, args: &FitSensor) -> Result<()> {
         out.write("response.svg", figure(&fit, &names).to_svg()?)?;
         out.finish(&session.manifest(configuration, vec![input]))?;
     }
-    if args.json { session.print_json(&document(&fit)) } else { session.print(&text(&fit)) }
+    if args.json {
+        session.print_json(&document(&fit))
+    } else {
+        session.print(&text(&fit))
+    }
 }
 
 /// The pairs, the names of their columns, and the file.
@@ -34,15 +38,23 @@ fn read(args: &FitSensor) -> Result<(Vec<[f64; 2]>, [String; 2], Input)> {
             return Err(file.header_error("two columns are needed: distance in m, and reading"));
         }
         None => [0, 1],
-        Some([distance, reading]) => [distance, reading].map(|name| file.column(name).ok_or(name)).map_ok(&file)?,
-        Some(other) => bail!("--columns needs two names, distance and reading; {} given", other.len()),
+        Some([distance, reading]) => [distance, reading]
+            .map(|name| file.column(name).ok_or(name))
+            .map_ok(&file)?,
+        Some(other) => bail!(
+            "--columns needs two names, distance and reading; {} given",
+            other.len()
+        ),
     };
     let names = columns.map(|i| file.header[i].clone());
     let mut pairs = Vec::new();
     while let Some(row) = file.next_row()? {
         let pair = [row.required(columns[0])?, row.required(columns[1])?];
         if pair[0] < 0.0 {
-            return Err(row.field_error(columns[0], format!("{} m is no distance; it must not be negative", pair[0])));
+            return Err(row.field_error(
+                columns[0],
+                format!("{} m is no distance; it must not be negative", pair[0]),
+            ));
         }
         pairs.push(pair);
     }
@@ -86,10 +98,15 @@ fn document(fit: &ResponseFit) -> Value {
 }
 
 fn text(fit: &ResponseFit) -> String {
-    let mut table = Table::new("reading = a / (1 + (d/d0)^p), least squares on log reading", &[
-        "parameter", "value", "standard error", "95 % interval",
-    ]);
-    let rows = [("a, counts", &fit.a_counts, 1.0, 2), ("d0, mm", &fit.d0_m, 1000.0, 5), ("p", &fit.exponent, 1.0, 5)];
+    let mut table = Table::new(
+        "reading = a / (1 + (d/d0)^p), least squares on log reading",
+        &["parameter", "value", "standard error", "95 % interval"],
+    );
+    let rows = [
+        ("a, counts", &fit.a_counts, 1.0, 2),
+        ("d0, mm", &fit.d0_m, 1000.0, 5),
+        ("p", &fit.exponent, 1.0, 5),
+    ];
     for (name, e, scale, digits) in rows {
         let (value, error, half) = (scale * e.value, scale * e.standard_error, scale * e.half_width_95);
         table.push([
@@ -107,7 +124,10 @@ fn text(fit: &ResponseFit) -> String {
         100.0 * fit.leave_one_out_relative_error(),
     );
     if fit.set_aside > 0 {
-        text += &format!("{} pairs with readings of 0 or less have no logarithm and are set aside\n", fit.set_aside);
+        text += &format!(
+            "{} pairs with readings of 0 or less have no logarithm and are set aside\n",
+            fit.set_aside
+        );
     }
     text
 }
@@ -115,15 +135,26 @@ fn text(fit: &ResponseFit) -> String {
 fn figure(fit: &ResponseFit, names: &[String; 2]) -> Figure {
     let response = fit.response();
     let farthest = fit.pairs.iter().map(|p| p[0]).fold(0.0, f64::max);
-    let curve = (0..=200).map(|i| farthest * 1.1 * f64::from(i) / 200.0).map(|d| [d, response.reading(d)]).collect();
+    let curve = (0..=200)
+        .map(|i| farthest * 1.1 * f64::from(i) / 200.0)
+        .map(|d| [d, response.reading(d)])
+        .collect();
     let panel = Panel {
         x: Axis::linear(format!("{} (m)", names[0])),
         y: Axis::log(format!("{} (counts)", names[1])),
         marks: vec![
             Mark::new("fit", Style::series(0), Shape::Line(curve)),
-            Mark::new("measured", Style::color(Color::INK), Shape::Points(fit.pairs.clone())),
+            Mark::new(
+                "measured",
+                Style::color(Color::INK),
+                Shape::Points(fit.pairs.clone()),
+            ),
         ],
         ..Panel::default()
     };
-    single("Sensor response", "Measured pairs and the fitted response.", panel)
+    single(
+        "Sensor response",
+        "Measured pairs and the fitted response.",
+        panel,
+    )
 }

@@ -53,14 +53,24 @@ pub(crate) fn run(session: &Session, args: &Reproduce) -> Result<()> {
     progress.message("casting rays");
     let costs = ray_study::measure(&study.standard, &study.measured.circuit, &SEGMENTS, &|| ())?;
     let ladder_draws = (session.seed(), draws.min(LADDER_DRAWS), study.laps);
-    let rungs = ray_study::ladder(&study.standard, &study.measured.circuit, &study.real, ladder_draws)?;
+    let rungs = ray_study::ladder(
+        &study.standard,
+        &study.measured.circuit,
+        &study.real,
+        ladder_draws,
+    )?;
     drop(progress);
     let tables = tables_json(session.seed(), draws, &outcomes);
     let text = text(&outcomes, &out);
     let mut files = report(session.seed(), &study, outcomes);
     let place = files.report.sections.len() - 2; // after the experiments
-    files.report.sections.insert(place, ray_study::section(&rungs, ladder_draws.1));
-    files.csv.push(("ladder.csv", ray_study::ladder_table(&rungs).to_csv()));
+    files
+        .report
+        .sections
+        .insert(place, ray_study::section(&rungs, ladder_draws.1));
+    files
+        .csv
+        .push(("ladder.csv", ray_study::ladder_table(&rungs).to_csv()));
     write(&folder, &tables, files)?;
     folder.write(ray_study::PICTURE, ray_study::figure(&costs, &rungs).to_svg()?)?;
     interrupt::check()?;

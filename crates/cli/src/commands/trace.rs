@@ -15,7 +15,10 @@ use crate::trace::{Cache, Trace, document, sections, summary};
 pub(crate) fn run(session: &Session, args: &args::Trace) -> Result<()> {
     let file = setup::model_file(&args.model)?;
     let [measured] = args.measured.as_slice() else {
-        bail!("one --measured data set at a time can be traced; {} given", args.measured.len());
+        bail!(
+            "one --measured data set at a time can be traced; {} given",
+            args.measured.len()
+        );
     };
     let set = DataSet::load(measured)?;
     let held_out = args.held_out.as_deref().map(DataSet::load).transpose()?;
@@ -38,11 +41,26 @@ pub(crate) fn run(session: &Session, args: &args::Trace) -> Result<()> {
     }
     let text = summary(&trace);
     let title = format!("What the model lacks: {}", trace.measured.set.name);
-    let tables: String = sections.iter().flat_map(Section::tables).map(|table| table.to_text() + "\n").collect();
-    folder.write("report.html", Report { title, lead: Vec::new(), sections }.to_html()?)?;
+    let tables: String = sections
+        .iter()
+        .flat_map(Section::tables)
+        .map(|table| table.to_text() + "\n")
+        .collect();
+    folder.write(
+        "report.html",
+        Report {
+            title,
+            lead: Vec::new(),
+            sections,
+        }
+        .to_html()?,
+    )?;
     folder.finish(&session.manifest(configuration, inputs))?;
     if args.json {
         return session.print_json(&document);
     }
-    session.print(&format!("{text}\n\n{tables}report: {}\n", args.out.join("report.html").display()))
+    session.print(&format!(
+        "{text}\n\n{tables}report: {}\n",
+        args.out.join("report.html").display()
+    ))
 }

@@ -18,9 +18,12 @@ use crate::table::Table;
 pub(crate) fn run(session: &Session, args: &World) -> Result<()> {
     match args {
         World::Check { world, json, out } => check(session, &source(world)?, *json, out.as_deref()),
-        World::Segments { world, max_error, json, out } => {
-            segments(session, &source(world)?, max_error, *json, out.as_deref())
-        }
+        World::Segments {
+            world,
+            max_error,
+            json,
+            out,
+        } => segments(session, &source(world)?, max_error, *json, out.as_deref()),
     }
 }
 
@@ -43,7 +46,10 @@ fn check(session: &Session, source: &WorldSource, json: bool, out: Option<&Path>
     if let Some(out) = out {
         let folder = OutDir::create(out, &Work::new("world check", &source.text), false)?;
         let marks = vec![walls(course), joints(course), gates(&circuit)];
-        folder.write("course.svg", single("The course", "Walls, joints and gates.", map("", marks)).to_svg()?)?;
+        folder.write(
+            "course.svg",
+            single("The course", "Walls, joints and gates.", map("", marks)).to_svg()?,
+        )?;
         folder.finish(&session.manifest(json!({ "world": source.label }), vec![source.input.clone()]))?;
     }
     let wall = |side: Side| {
@@ -61,24 +67,43 @@ fn check(session: &Session, source: &WorldSource, json: bool, out: Option<&Path>
         "midline_m": circuit.gates.midline_length_m(),
         "gate_spacing_m": circuit.gates.spacing_m(),
     });
-    if json { session.print_json(&document) } else { session.print(&check_text(&document)) }
+    if json {
+        session.print_json(&document)
+    } else {
+        session.print(&check_text(&document))
+    }
 }
 
 fn check_text(document: &Value) -> String {
     let millimetres = |value: &Value| format!("{:.1} mm", MM * value.as_f64().unwrap_or(f64::NAN));
     let metres = |value: &Value| format!("{:.4} m", value.as_f64().unwrap_or(f64::NAN));
-    let mut table = Table::new(format!("{}: sound", document["world"].as_str().unwrap_or("")), &["what", "value"]);
+    let mut table = Table::new(
+        format!("{}: sound", document["world"].as_str().unwrap_or("")),
+        &["what", "value"],
+    );
     for wall in document["walls"].as_array().into_iter().flatten() {
         let name = wall["name"].as_str().unwrap_or("");
-        table.push([format!("{name} wall"), format!("{}, {} b-splines", metres(&wall["length_m"]), wall["splines"])]);
+        table.push([
+            format!("{name} wall"),
+            format!("{}, {} b-splines", metres(&wall["length_m"]), wall["splines"]),
+        ]);
     }
     let corridor = &document["corridor_m"];
-    table.push(["driven".to_owned(), document["direction"].as_str().unwrap_or("").to_owned()]);
-    table.push(["narrowest corridor".to_owned(), millimetres(&corridor["narrowest"])]);
+    table.push([
+        "driven".to_owned(),
+        document["direction"].as_str().unwrap_or("").to_owned(),
+    ]);
+    table.push([
+        "narrowest corridor".to_owned(),
+        millimetres(&corridor["narrowest"]),
+    ]);
     table.push(["widest corridor".to_owned(), millimetres(&corridor["widest"])]);
     table.push(["midline".to_owned(), metres(&document["midline_m"])]);
     let spacing = millimetres(&document["gate_spacing_m"]);
-    table.push(["gates".to_owned(), format!("{}, {spacing} apart", document["gates"])]);
+    table.push([
+        "gates".to_owned(),
+        format!("{}, {spacing} apart", document["gates"]),
+    ]);
     table.to_text()
 }
 
@@ -90,8 +115,10 @@ fn segments(
     out: Option<&Path>,
 ) -> Result<()> {
     let course = setup::course(source)?;
-    let approximations: Vec<Value> =
-        max_errors_m.iter().map(|&error| approximation(&course, error)).collect::<Result<_>>()?;
+    let approximations: Vec<Value> = max_errors_m
+        .iter()
+        .map(|&error| approximation(&course, error))
+        .collect::<Result<_>>()?;
     let document = json!({ "world": course.name, "approximations": approximations });
     if let Some(out) = out {
         let configuration = json!({ "world": source.label, "max_error_m": max_errors_m });
@@ -103,8 +130,16 @@ fn segments(
     if json {
         return session.print_json(&document);
     }
-    let mut table =
-        Table::new(&course.name, &["max error, mm", "segments", "outer", "inner", "measured error, mm"]);
+    let mut table = Table::new(
+        &course.name,
+        &[
+            "max error, mm",
+            "segments",
+            "outer",
+            "inner",
+            "measured error, mm",
+        ],
+    );
     for a in &approximations {
         let mm = |value: &Value| MM * value.as_f64().unwrap_or(f64::NAN);
         table.push([
@@ -119,7 +154,12 @@ fn segments(
 }
 
 fn approximation(course: &Course, max_error_m: f64) -> Result<Value> {
-    let chain = |side: Side| course.wall(side).flatten(max_error_m).map(|chain| (course.wall(side), chain));
+    let chain = |side: Side| {
+        course
+            .wall(side)
+            .flatten(max_error_m)
+            .map(|chain| (course.wall(side), chain))
+    };
     let both = chain(Side::Outer).and_then(|outer| Ok((outer, chain(Side::Inner)?)));
     let (outer, inner) = both.with_context(|| format!("--max-error {max_error_m}"))?;
     let measured = |(wall, chain): &(&track::Wall, track::Chain)| chain.measured_error_m(wall);
@@ -138,21 +178,39 @@ pub(crate) fn segments_figure(course: &Course, marked_m: &[f64]) -> Result<Figur
         let n = course.outer.flatten(error_m)?.vertices.len() + course.inner.flatten(error_m)?.vertices.len();
         Ok([MM * error_m, n as f64])
     };
-    let ladder: Vec<[f64; 2]> =
-        (0..=30).map(|i| count(1e-4 * 10_f64.powf(f64::from(i) * 0.1))).collect::<Result<_>>()?;
+    let ladder: Vec<[f64; 2]> = (0..=30)
+        .map(|i| count(1e-4 * 10_f64.powf(f64::from(i) * 0.1)))
+        .collect::<Result<_>>()?;
     // The law through the finest cut, where it holds best.
-    let law: Vec<[f64; 2]> =
-        ladder.iter().map(|[e, _]| [*e, ladder[0][1] * (ladder[0][0] / e).sqrt()]).collect();
+    let law: Vec<[f64; 2]> = ladder
+        .iter()
+        .map(|[e, _]| [*e, ladder[0][1] * (ladder[0][0] / e).sqrt()])
+        .collect();
     let marked: Vec<[f64; 2]> = marked_m.iter().map(|&e| count(e)).collect::<Result<_>>()?;
     let panel = Panel {
         x: Axis::log("maximal error, mm"),
         y: Axis::log("segments"),
         marks: vec![
-            Mark::new("error^(-1/2)", Style { dash: Dash::Dashed, ..Style::color(Color::GREY) }, Shape::Line(law)),
+            Mark::new(
+                "error^(-1/2)",
+                Style {
+                    dash: Dash::Dashed,
+                    ..Style::color(Color::GREY)
+                },
+                Shape::Line(law),
+            ),
             Mark::new("both walls", Style::series(0), Shape::Line(ladder)),
-            Mark::new("asked for", Style::color(Color::VERMILLION), Shape::Points(marked)),
+            Mark::new(
+                "asked for",
+                Style::color(Color::VERMILLION),
+                Shape::Points(marked),
+            ),
         ],
         ..Panel::default()
     };
-    Ok(single("Segments against wall error", "The number of straight segments grows as error^(-1/2).", panel))
+    Ok(single(
+        "Segments against wall error",
+        "The number of straight segments grows as error^(-1/2).",
+        panel,
+    ))
 }

@@ -79,9 +79,7 @@ fn check_array(key: &str, items: &[Value], like: &[Value]) -> Result<(), Fault> 
         let problem = format!("`{key}` has length {found}; {needed} is needed");
         return Err(Fault::new(key, problem));
     }
-    let item_like = like
-        .first()
-        .expect("no array of the shipped model is empty");
+    let item_like = like.first().expect("no array of the shipped model is empty");
     items.iter().enumerate().try_for_each(|(index, item)| {
         let key = join(key, &index.to_string());
         check_value(&key, item, item_like)?;
@@ -157,11 +155,7 @@ fn check_parameter(key: &str, value: &Value) -> Result<(), Fault> {
             .iter()
             .enumerate()
             .try_for_each(|(index, item)| check_parameter(&join(key, &index.to_string()), item)),
-        _ => Err(wrong_type(
-            key,
-            value,
-            "a number, a string or an array of them",
-        )),
+        _ => Err(wrong_type(key, value, "a number, a string or an array of them")),
     }
 }
 
@@ -263,16 +257,13 @@ impl<'a> Place<'a> {
     /// The value at `name` of the place at `at`; a table without it gets it.
     fn slot(self, at: &str, name: &str) -> Result<&'a mut Value, Fault> {
         match self {
-            Place::Table(table) => Ok(table
-                .entry(name)
-                .or_insert_with(|| Value::Table(Table::new()))),
+            Place::Table(table) => Ok(table.entry(name).or_insert_with(|| Value::Table(Table::new()))),
             Place::Array(items) => {
                 let count = items.len();
                 let index = name.parse().unwrap_or(usize::MAX);
                 items.get_mut(index).ok_or_else(|| {
                     let key = join(at, name);
-                    let problem =
-                        format!("`{key}` is not there: `{at}` has length {count}, counted from 0");
+                    let problem = format!("`{key}` is not there: `{at}` has length {count}, counted from 0");
                     Fault::new(&key, problem)
                 })
             }

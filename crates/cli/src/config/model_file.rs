@@ -105,8 +105,7 @@ impl ModelFile {
     pub(crate) fn world(&self, override_path: Option<&Path>) -> Result<WorldSource> {
         let set = self.set_of("world");
         let beside = self.path.as_deref().filter(|_| set.is_none());
-        world_source(&self.config.world, beside, override_path).map_err(|error| match override_path
-        {
+        world_source(&self.config.world, beside, override_path).map_err(|error| match override_path {
             Some(_) => error,
             None => self.located("world", format!("{error:#}")),
         })

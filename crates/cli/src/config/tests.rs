@@ -90,11 +90,7 @@ fn values_on_the_command_line_are_toml_or_bare_strings() {
         "sensor.kind = \"original\"",
         "sensor={kind='original'}",
     ] {
-        assert_eq!(
-            config("", &[set]).sensor.kind,
-            SensorKind::Original,
-            "{set}"
-        );
+        assert_eq!(config("", &[set]).sensor.kind, SensorKind::Original, "{set}");
     }
     let set = "sensor.original.table=[[0, 1], [0.05, 0.5], [0.1, 0]]";
     assert_eq!(config("", &[set]).sensor.original.table.len(), 3);
@@ -177,10 +173,7 @@ fn values_of_the_wrong_type_say_what_is_needed() {
             "slip.level = \"high\"",
             "slip.level = \"high\", but a number is needed",
         ),
-        (
-            "slip.level = nan",
-            "slip.level = nan is not a finite number",
-        ),
+        ("slip.level = nan", "slip.level = nan is not a finite number"),
         (
             "wall.max_error_m = -inf",
             "wall.max_error_m = -inf is not a finite number",
@@ -199,10 +192,7 @@ fn values_of_the_wrong_type_say_what_is_needed() {
             "sensor.kind = \"improve\"",
             "unknown `sensor.kind` = \"improve\"; known: improved, original",
         ),
-        (
-            "sensor.mounts = []",
-            "`sensor.mounts` has length 0; 8 is needed",
-        ),
+        ("sensor.mounts = []", "`sensor.mounts` has length 0; 8 is needed"),
         (
             "sensor.original.table = [[1]]",
             "`sensor.original.table.0` has length 1; 2 is needed",
@@ -246,10 +236,7 @@ fn broken_files_name_file_and_line() {
     assert!(message("slip.level = 1e999", &[]).starts_with("model.toml:1: "));
     let missing = ModelFile::load(ModelSource::Path(Path::new("no/model.toml")), &[]);
     let missing = format!("{:#}", missing.unwrap_err());
-    assert!(
-        missing.starts_with("cannot read no/model.toml: "),
-        "{missing}"
-    );
+    assert!(missing.starts_with("cannot read no/model.toml: "), "{missing}");
     let bytes = Document::parse("m.toml", b"a = 1\nb = \"\xff\"\n".to_vec());
     let bytes = bytes.unwrap_err().to_string();
     assert_eq!(bytes, "m.toml:2: not UTF-8 text; save the file as UTF-8");
@@ -274,10 +261,7 @@ fn later_errors_find_the_line_of_their_key() {
         located("slip.level", "slip.level = 1.4 is outside [0, 1]"),
         "model.toml:4: slip.level = 1.4 is outside [0, 1]"
     );
-    assert_eq!(
-        located("camera.noise_m", "no"),
-        "--set camera.noise_m=-1: no"
-    );
+    assert_eq!(located("camera.noise_m", "no"), "--set camera.noise_m=-1: no");
     assert_eq!(located("wall.max_error_m", "no"), "model.toml:6: no");
     assert_eq!(located("robot.axle_m", "no"), "model.toml: no");
 }

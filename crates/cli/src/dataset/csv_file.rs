@@ -49,7 +49,9 @@ impl CsvFile {
         let label = path.display().to_string();
         let input = Input::of(label.clone(), bytes);
         let text: Arc<[u8]> = if path.extension().is_some_and(|ending| ending == "gz") {
-            unpacked(bytes).with_context(|| format!("{label} cannot be unpacked as gzip"))?.into()
+            unpacked(bytes)
+                .with_context(|| format!("{label} cannot be unpacked as gzip"))?
+                .into()
         } else {
             bytes.into()
         };
@@ -126,7 +128,8 @@ impl Row<'_> {
     /// Anything else, with file, line and column.
     pub(crate) fn number(&self, column: usize) -> Result<Option<f64>> {
         let mend = "leave the field empty if it is missing";
-        self.parsed(column).map_err(|field| self.not_finite(column, &field, mend))
+        self.parsed(column)
+            .map_err(|field| self.not_finite(column, &field, mend))
     }
 
     /// The number in a column that may not be empty.
@@ -157,11 +160,7 @@ impl Row<'_> {
     }
 
     /// The message with file, line and column.
-    pub(crate) fn field_error(
-        &self,
-        column: usize,
-        message: impl std::fmt::Display,
-    ) -> anyhow::Error {
+    pub(crate) fn field_error(&self, column: usize, message: impl std::fmt::Display) -> anyhow::Error {
         let name = self.header.get(column).map_or("", String::as_str);
         self.error(format!("{name}: {message}"))
     }
@@ -177,11 +176,7 @@ impl Row<'_> {
         let start = usize::try_from(byte).unwrap_or(usize::MAX);
         let (before, after) = self.text.split_at(start.min(self.text.len()));
         let empty = after.iter().take_while(|byte| b"\r\n".contains(byte));
-        1 + before
-            .iter()
-            .chain(empty)
-            .filter(|&&byte| byte == b'\n')
-            .count()
+        1 + before.iter().chain(empty).filter(|&&byte| byte == b'\n').count()
     }
 }
 

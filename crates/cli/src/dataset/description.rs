@@ -126,8 +126,7 @@ impl Description {
         ControllerKind::from_name(&name).ok_or_else(|| {
             let nearest = nearest(&name, ControllerKind::NAMES.iter().copied()).join(", ");
             let known = ControllerKind::NAMES.join(", ");
-            let message =
-                format!("unknown controller `{name}`; nearest: {nearest}; known: {known}");
+            let message = format!("unknown controller `{name}`; nearest: {nearest}; known: {known}");
             self.error("controller", message)
         })
     }

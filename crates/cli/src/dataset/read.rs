@@ -54,9 +54,8 @@ impl Columns {
     fn find(file: &CsvFile) -> Result<Self> {
         let column = |name: &str| {
             let known = file.header.join(", ");
-            file.column(name).ok_or_else(|| {
-                file.header_error(format!("column {name} is missing; there are: {known}"))
-            })
+            file.column(name)
+                .ok_or_else(|| file.header_error(format!("column {name} is missing; there are: {known}")))
         };
         Ok(Self {
             t_s: column("t_s")?,

@@ -47,16 +47,9 @@ fn a_data_set_is_read_whole() {
     assert_eq!(set.runs[0].rows.t_s, [0.0, 0.064]);
     assert_eq!(set.runs[0].rows.position_m, [Some([1.2125, 0.672]), None]);
     assert_eq!(set.runs[0].rows.log, None);
-    let hashes: Vec<_> = set
-        .inputs
-        .iter()
-        .map(|input| input.sha256.as_str())
-        .collect();
+    let hashes: Vec<_> = set.inputs.iter().map(|input| input.sha256.as_str()).collect();
     assert_eq!(hashes, [sha256(DATASET.as_bytes()), sha256(RUN.as_bytes())]);
-    assert_eq!(
-        set,
-        DataSet::load(&folder.path().join(DESCRIPTION)).unwrap()
-    );
+    assert_eq!(set, DataSet::load(&folder.path().join(DESCRIPTION)).unwrap());
     assert!(set.world_source(None).is_ok());
 }
 
@@ -78,16 +71,10 @@ fn packed_runs_and_logs_are_read_past_extra_columns() {
 
 #[test]
 fn one_run_finds_its_description_or_does_without() {
-    let folder = folder(
-        &format!("\u{feff}{DATASET}declared.slip.level = 0.5\n"),
-        RUN,
-    );
+    let folder = folder(&format!("\u{feff}{DATASET}declared.slip.level = 0.5\n"), RUN);
     let path = folder.path().join("run_a.csv");
     let set = load_run_csv(&path).unwrap();
-    assert_eq!(
-        (set.name.as_str(), set.runs[0].name.as_str()),
-        ("case", "a")
-    );
+    assert_eq!((set.name.as_str(), set.runs[0].name.as_str()), ("case", "a"));
     let config = set.declared_config(&Config::shipped()).unwrap();
     assert_eq!(config.slip.level, 0.5);
     fs::remove_file(folder.path().join(DESCRIPTION)).unwrap();
@@ -222,10 +209,9 @@ fn faults_of_the_description_name_line_and_key() {
         ),
     ] {
         // `[declared]` takes what stands below it.
-        let dataset = DATASET.replace(from, to).replace(
-            "gian_per_count = 1\nnote = \"by hand\"",
-            "gian_per_count = 1",
-        );
+        let dataset = DATASET
+            .replace(from, to)
+            .replace("gian_per_count = 1\nnote = \"by hand\"", "gian_per_count = 1");
         assert_eq!(message(&dataset, RUN), expected);
     }
     let broken = message("name = \"case\"\nworld = = 1\n", RUN);
@@ -321,17 +307,11 @@ fn what_is_written_is_read_back() {
     let folder = TempDir::new().unwrap();
     write_dataset(folder.path(), &set).unwrap();
     let read = DataSet::load(folder.path()).unwrap();
-    assert_eq!(
-        (read.name.as_str(), read.note.as_str()),
-        (set.name, set.note)
-    );
+    assert_eq!((read.name.as_str(), read.note.as_str()), (set.name, set.note));
     assert_eq!(read.controller, Some(ControllerKind::RuleBased));
     assert_eq!(&read.declared, set.declared);
     for (read, (name, rows)) in read.runs.iter().zip(&runs) {
-        assert_eq!(
-            (&read.name, &read.rows.position_m),
-            (name, &rows.position_m)
-        );
+        assert_eq!((&read.name, &read.rows.position_m), (name, &rows.position_m));
     }
     let error = write_dataset(&folder.path().join("no"), &set).unwrap_err();
     assert!(format!("{error:#}").starts_with("cannot write "));
@@ -373,7 +353,10 @@ fn the_shipped_laps_are_there_without_a_folder() {
         assert_eq!(set.controller, Some(controller));
         assert!(set.is_shipped());
         let runs: Vec<_> = set.runs.iter().map(|run| run.name.as_str()).collect();
-        assert_eq!((runs, set.laps, set.inputs.len()), (vec!["a", "b", "c", "d"], 20, 5));
+        assert_eq!(
+            (runs, set.laps, set.inputs.len()),
+            (vec!["a", "b", "c", "d"], 20, 5)
+        );
         assert!(set.runs.iter().all(|run| run.rows.t_s.len() > 20_000));
         assert_eq!(set.world_source(None).unwrap().path, None);
     }

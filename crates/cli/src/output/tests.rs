@@ -90,11 +90,7 @@ fn anything_else_is_refused_and_left_alone() {
     assert!(refusal(&dir, false).contains("out is there and is not a folder; name another"));
     fs::remove_file(&dir).unwrap();
     fs::create_dir(&dir).unwrap();
-    for foreign in [
-        "{}",
-        "no json",
-        "{\"program\": \"other\", \"version\": \"1\"}",
-    ] {
+    for foreign in ["{}", "no json", "{\"program\": \"other\", \"version\": \"1\"}"] {
         fs::write(dir.join("manifest.json"), foreign).unwrap();
         assert!(refusal(&dir, false).contains("holds no manifest.json of lapwing"));
         assert_eq!(names(&dir), ["manifest.json"]);
@@ -203,9 +199,7 @@ fn a_full_disk_names_file_and_cause_and_leaves_nothing() {
     let out = OutDir::create(&home.path().join("out"), &work(0.1), false).unwrap();
     std::os::unix::fs::symlink("/dev/full", out.path().join("a.csv.tmp")).unwrap();
     let error = format!("{:#}", out.write("a.csv", "1").unwrap_err());
-    assert!(
-        error.starts_with("cannot write ") && error.contains("out.partial/a.csv: No space left")
-    );
+    assert!(error.starts_with("cannot write ") && error.contains("out.partial/a.csv: No space left"));
     assert_eq!(out.read("a.csv").unwrap(), None);
     drop(out);
     assert!(names(home.path()).is_empty());

@@ -14,12 +14,20 @@ pub(crate) struct Cache(Option<PathBuf>);
 impl Cache {
     /// The cache in a folder; the platform's own if none is given; none at all if it is not wanted.
     pub(crate) fn new(folder: Option<&Path>, wanted: bool) -> Self {
-        let place = || folder.map(Path::to_owned).or_else(|| directories().map(|dir| dir.join("lapwing")));
+        let place = || {
+            folder
+                .map(Path::to_owned)
+                .or_else(|| directories().map(|dir| dir.join("lapwing")))
+        };
         Self(wanted.then(place).flatten())
     }
 
     fn file(&self, key: &str) -> Option<PathBuf> {
-        let name = format!("atlas-{}-{}", env!("CARGO_PKG_VERSION"), &sha256(key.as_bytes())[..32]);
+        let name = format!(
+            "atlas-{}-{}",
+            env!("CARGO_PKG_VERSION"),
+            &sha256(key.as_bytes())[..32]
+        );
         self.0.as_ref().map(|folder| folder.join(name))
     }
 
@@ -27,7 +35,9 @@ impl Cache {
     pub(crate) fn get(&self, key: &str) -> Option<Atlas> {
         let bytes = fs::read(self.file(key)?).ok()?;
         let (hash, atlas) = bytes.split_at_checked(64)?;
-        (sha256(atlas).as_bytes() == hash).then(|| Atlas::from_bytes(atlas)).flatten()
+        (sha256(atlas).as_bytes() == hash)
+            .then(|| Atlas::from_bytes(atlas))
+            .flatten()
     }
 
     /// Keeps an atlas; a cache that cannot be written is no error, the next call only takes longer.
@@ -44,7 +54,11 @@ impl Cache {
 
 /// The platform's folder for caches, by its own rules.
 fn directories() -> Option<PathBuf> {
-    let variable = |name: &str| std::env::var_os(name).filter(|value| !value.is_empty()).map(PathBuf::from);
+    let variable = |name: &str| {
+        std::env::var_os(name)
+            .filter(|value| !value.is_empty())
+            .map(PathBuf::from)
+    };
     if cfg!(windows) {
         return variable("LOCALAPPDATA");
     }

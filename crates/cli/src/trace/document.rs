@@ -55,8 +55,17 @@ fn four(numbers: &FourNumbers) -> Value {
 }
 
 fn residual(numbers: &FourNumbers, answer: Option<&Explanation>) -> Value {
-    let named = [("mean", numbers.mean), ("runs", numbers.runs), ("trend", numbers.trend), ("noise", numbers.noise)];
-    let places: Vec<&str> = named.iter().filter(|(_, q)| q.p < 0.002).map(|(name, _)| *name).collect();
+    let named = [
+        ("mean", numbers.mean),
+        ("runs", numbers.runs),
+        ("trend", numbers.trend),
+        ("noise", numbers.noise),
+    ];
+    let places: Vec<&str> = named
+        .iter()
+        .filter(|(_, q)| q.p < 0.002)
+        .map(|(name, _)| *name)
+        .collect();
     json!({
         "stage": answer.map(|a| a.effects[0].setting.spec.stage.name()),
         "significant": numbers.omnibus_p() < 0.002,
@@ -70,7 +79,10 @@ fn effects(answer: &Explanation, rivals: &[Explanation]) -> Vec<Value> {
     let count = answer.effects.len() as f64;
     let effect = |(place, effect): (usize, &Candidate)| {
         let name = effect.setting.spec.name;
-        let others = rivals.iter().filter_map(|rival| rival.names().get(place).copied()).filter(|n| *n != name);
+        let others = rivals
+            .iter()
+            .filter_map(|rival| rival.names().get(place).copied())
+            .filter(|n| *n != name);
         let mut alternatives: Vec<&str> = others.collect();
         alternatives.sort_unstable();
         alternatives.dedup();
@@ -99,8 +111,14 @@ fn parameters(effect: &Candidate) -> Vec<Value> {
     let params = effect.setting.spec.params;
     let errors = &effect.standard_errors;
     let entry = |param: &sim::Param, name: String, values: Value, low: Value, high: Value| {
-        let mut entry = json!({ "name": name, "value": values, "unit": param.unit, "low": low, "high": high });
-        if let (Some(choice), None) = (entry["value"].as_f64().and_then(|v| param.choices.get(v as usize)), param.neutral) {
+        let mut entry =
+            json!({ "name": name, "value": values, "unit": param.unit, "low": low, "high": high });
+        if let (Some(choice), None) = (
+            entry["value"]
+                .as_f64()
+                .and_then(|v| param.choices.get(v as usize)),
+            param.neutral,
+        ) {
             entry["value"] = json!(choice);
         }
         entry
@@ -120,7 +138,13 @@ fn parameters(effect: &Candidate) -> Vec<Value> {
                 all.push(entry(p, p.name.into(), json!(start[i]), json!(low), json!(high)));
                 if per_s[i] != 0.0 {
                     let (low, high) = bounds(per_s[i], errors[params.len() + i]);
-                    all.push(entry(p, format!("{}_per_s", p.name), json!(per_s[i]), json!(low), json!(high)));
+                    all.push(entry(
+                        p,
+                        format!("{}_per_s", p.name),
+                        json!(per_s[i]),
+                        json!(low),
+                        json!(high),
+                    ));
                 }
             }
             all

@@ -31,23 +31,48 @@ impl MeanLaps {
     pub(crate) fn new(setup: &Setup, effects: &[Setting], seed: u64, laps: usize) -> Result<Self> {
         let mut model = setup.model.clone();
         model.effects.extend_from_slice(effects);
-        let variant = Setup { model, scene: setup.scene.clone() };
+        let variant = Setup {
+            model,
+            scene: setup.scene.clone(),
+        };
         let drives: Vec<sim::Drive> = (0..SETS * RUNS)
             .into_par_iter()
             .map(|i| {
-                let streams = Streams { seed: seed + SEED_OFFSET + i / RUNS, run: i % RUNS };
+                let streams = Streams {
+                    seed: seed + SEED_OFFSET + i / RUNS,
+                    run: i % RUNS,
+                };
                 variant.drive(streams, laps, |_| {})
             })
             .collect::<Result<_, _>>()?;
         let closed = |drive: &sim::Drive| -> Vec<Vec<f64>> {
-            drive.laps.iter().filter(|lap| lap.missed.is_empty()).map(|lap| lap.offsets_m.clone()).collect()
+            drive
+                .laps
+                .iter()
+                .filter(|lap| lap.missed.is_empty())
+                .map(|lap| lap.offsets_m.clone())
+                .collect()
         };
-        let runs: Vec<Vec<Vec<f64>>> = drives.iter().map(closed).filter(|laps| !laps.is_empty()).collect();
+        let runs: Vec<Vec<Vec<f64>>> = drives
+            .iter()
+            .map(closed)
+            .filter(|laps| !laps.is_empty())
+            .collect();
         let laps_m: Vec<Vec<f64>> = runs.iter().flatten().cloned().collect();
         let mean_m = mean(&laps_m).context("the simulated robot completes no lap")?;
-        let times: Vec<f64> = drives.iter().flat_map(|d| &d.laps).map(track::Lap::duration_s).filter(|t| t.is_finite()).collect();
+        let times: Vec<f64> = drives
+            .iter()
+            .flat_map(|d| &d.laps)
+            .map(track::Lap::duration_s)
+            .filter(|t| t.is_finite())
+            .collect();
         let lap_s = times.iter().sum::<f64>() / times.len() as f64;
-        Ok(Self { mean_m, runs_m: runs.iter().filter_map(|laps| mean(laps)).collect(), lap_s, laps_m })
+        Ok(Self {
+            mean_m,
+            runs_m: runs.iter().filter_map(|laps| mean(laps)).collect(),
+            lap_s,
+            laps_m,
+        })
     }
 
     /// The root mean square over the gates of the difference to a measured run's mean lap, m.
@@ -64,7 +89,11 @@ impl MeanLaps {
 /// The mean of laps, gate by gate.
 pub(crate) fn mean(laps: &[Vec<f64>]) -> Option<Vec<f64>> {
     let gates = laps.first()?.len();
-    Some((0..gates).map(|g| laps.iter().map(|lap| lap[g]).sum::<f64>() / laps.len() as f64).collect())
+    Some(
+        (0..gates)
+            .map(|g| laps.iter().map(|lap| lap[g]).sum::<f64>() / laps.len() as f64)
+            .collect(),
+    )
 }
 
 fn rms(a: &[f64], b: &[f64]) -> f64 {

@@ -66,7 +66,11 @@ impl Trace {
                 anyhow::Ok(Measured::on(set, circuit.clone())?.runs)
             })
             .transpose()?;
-        measured.runs.iter().flat_map(SampledRun::remarks).for_each(|remark| session.remark(&remark));
+        measured
+            .runs
+            .iter()
+            .flat_map(SampledRun::remarks)
+            .for_each(|remark| session.remark(&remark));
         let setup = Setup::new(&config, circuit, None)?;
         let shape: Vec<usize> = measured.runs.iter().map(|run| run.laps.len()).collect();
         let simulate = |effects: &[Setting], set: u64| data_set(&setup, effects, session.seed(), set, &shape);
@@ -90,9 +94,13 @@ impl Trace {
                 (runs, mean_over(distances))
             }
             None => {
-                let without = measured.runs.iter().zip(&diagnosis.left_out).map(|(run, effects)| {
-                    Ok(MeanLaps::new(&setup, effects, session.seed(), wanted)?.distance_m(run))
-                });
+                let without = measured
+                    .runs
+                    .iter()
+                    .zip(&diagnosis.left_out)
+                    .map(|(run, effects)| {
+                        Ok(MeanLaps::new(&setup, effects, session.seed(), wanted)?.distance_m(run))
+                    });
                 let distances = without.collect::<Result<_>>()?;
                 (measured.runs.clone(), mean_over(distances))
             }
@@ -100,13 +108,27 @@ impl Trace {
         let before_m = mean_over(held_out.iter().map(|run| before.distance_m(run)).collect());
         let floor_m = after.floor_m();
         let laps_simulated = Atlas::sets() * shape.iter().sum::<usize>() as u64;
-        Ok(Self { config, setup, measured, diagnosis, held_out, before, after, before_m, after_m, floor_m, laps_simulated })
+        Ok(Self {
+            config,
+            setup,
+            measured,
+            diagnosis,
+            held_out,
+            before,
+            after,
+            before_m,
+            after_m,
+            floor_m,
+            laps_simulated,
+        })
     }
 
     /// The declared model with the effects of the answer.
     pub(crate) fn after_config(&self) -> Config {
         let mut config = self.config.clone();
-        config.effect.extend(answer(&self.diagnosis).iter().map(setup::effect_table));
+        config
+            .effect
+            .extend(answer(&self.diagnosis).iter().map(setup::effect_table));
         config
     }
 }
@@ -115,7 +137,11 @@ impl Trace {
 pub(crate) fn answer(diagnosis: &Diagnosis) -> Vec<Setting> {
     match diagnosis.verdict {
         diagnose::Verdict::Faithful | diagnose::Verdict::Unexplained => Vec::new(),
-        _ => diagnosis.explanations.first().map(diagnose::Explanation::settings).unwrap_or_default(),
+        _ => diagnosis
+            .explanations
+            .first()
+            .map(diagnose::Explanation::settings)
+            .unwrap_or_default(),
     }
 }
 
@@ -131,21 +157,40 @@ fn belongs(set: &DataSet, config: &Config, world: &str) -> Result<()> {
             controller.name()
         );
     }
-    let source = set.world_source(None).with_context(|| format!("{shown}: whose world must be the model's"))?;
-    ensure!(source.text == world, "{shown}: driven in another world ({}) than the model's", source.label);
+    let source = set
+        .world_source(None)
+        .with_context(|| format!("{shown}: whose world must be the model's"))?;
+    ensure!(
+        source.text == world,
+        "{shown}: driven in another world ({}) than the model's",
+        source.label
+    );
     Ok(())
 }
 
 /// One simulated data set of the measured one's shape; `None` where a run does not complete its laps.
-fn data_set(setup: &Setup, effects: &[Setting], seed: u64, set: u64, shape: &[usize]) -> Option<Vec<Vec<track::Lap>>> {
+fn data_set(
+    setup: &Setup,
+    effects: &[Setting],
+    seed: u64,
+    set: u64,
+    shape: &[usize],
+) -> Option<Vec<Vec<track::Lap>>> {
     let mut model = setup.model.clone();
     model.effects.extend_from_slice(effects);
     let run = |(run, &laps): (usize, &usize)| {
         let world = setup.scene.world(&model, run).ok()?;
         // Data sets have seeds of their own, far from those that a user's `drive` has.
-        let streams = Streams { seed: (seed << 20) + (1 << 50) + set, run: run as u64 };
+        let streams = Streams {
+            seed: (seed << 20) + (1 << 50) + set,
+            run: run as u64,
+        };
         let drive = sim::drive(&world, streams, laps, |_| {}).ok()?;
-        let closed: Vec<track::Lap> = drive.laps.into_iter().filter(|lap| lap.missed.is_empty()).collect();
+        let closed: Vec<track::Lap> = drive
+            .laps
+            .into_iter()
+            .filter(|lap| lap.missed.is_empty())
+            .collect();
         (closed.len() == laps).then_some(closed)
     };
     shape.iter().enumerate().map(run).collect()

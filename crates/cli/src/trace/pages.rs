@@ -19,10 +19,22 @@ use crate::table::{Table, probability};
 /// Laps that cannot be compared.
 pub(crate) fn sections(trace: &Trace) -> Result<Vec<Section>> {
     Ok(vec![
-        Section { heading: "Diagnosis".into(), blocks: diagnosis(trace) },
-        Section { heading: "Where the model and the robot differ".into(), blocks: residual(trace) },
-        Section { heading: "What was tried".into(), blocks: candidates(trace) },
-        Section { heading: "Before and after".into(), blocks: before_and_after(trace) },
+        Section {
+            heading: "Diagnosis".into(),
+            blocks: diagnosis(trace),
+        },
+        Section {
+            heading: "Where the model and the robot differ".into(),
+            blocks: residual(trace),
+        },
+        Section {
+            heading: "What was tried".into(),
+            blocks: candidates(trace),
+        },
+        Section {
+            heading: "Before and after".into(),
+            blocks: before_and_after(trace),
+        },
     ])
 }
 
@@ -51,8 +63,11 @@ pub(crate) fn summary(trace: &Trace) -> String {
             format!("{word}: {}; this explains {:.1} % of the excess.{rest}", what.join(" and "), 100.0 * answer.share)
         }
     };
-    let rivals: Vec<&str> =
-        diagnosis.explanations[..diagnosis.indistinguishable].iter().skip(1).map(|e| e.label.as_str()).collect();
+    let rivals: Vec<&str> = diagnosis.explanations[..diagnosis.indistinguishable]
+        .iter()
+        .skip(1)
+        .map(|e| e.label.as_str())
+        .collect();
     let alternatives = if rivals.is_empty() {
         String::new()
     } else {
@@ -80,7 +95,10 @@ fn describe(effect: &diagnose::Candidate) -> String {
     let name = effect.setting.spec.name;
     match &effect.setting.pattern {
         Pattern::Constant(values) => format!("{name} ({})", list(values, &effect.standard_errors)),
-        Pattern::ByTime { start, .. } => format!("{name} changing in time ({} at the start)", list(start, &effect.standard_errors)),
+        Pattern::ByTime { start, .. } => format!(
+            "{name} changing in time ({} at the start)",
+            list(start, &effect.standard_errors)
+        ),
         Pattern::ByRun(runs) => {
             let count = params.len();
             let each: Vec<String> = runs
@@ -94,22 +112,45 @@ fn describe(effect: &diagnose::Candidate) -> String {
 }
 
 fn diagnosis(trace: &Trace) -> Vec<Block> {
-    let mut blocks: Vec<Block> = summary(trace).lines().map(|l| Block::Text(l.to_owned())).collect();
+    let mut blocks: Vec<Block> = summary(trace)
+        .lines()
+        .map(|l| Block::Text(l.to_owned()))
+        .collect();
     blocks.push(Block::Table(error_table(trace)));
     blocks
 }
 
 fn error_table(trace: &Trace) -> Table {
-    let mut table = Table::new("The simulation against the held-out runs", &["", "before", "after", "chance"]);
+    let mut table = Table::new(
+        "The simulation against the held-out runs",
+        &["", "before", "after", "chance"],
+    );
     let mm = |m: f64| format!("{:.2}", MM * m);
-    table.push(["mean lap, rms over the gates, mm".to_owned(), mm(trace.before_m), mm(trace.after_m), mm(trace.floor_m)]);
+    table.push([
+        "mean lap, rms over the gates, mm".to_owned(),
+        mm(trace.before_m),
+        mm(trace.after_m),
+        mm(trace.floor_m),
+    ]);
     let times: Vec<f64> = trace.held_out.iter().flat_map(SampledRun::lap_times_s).collect();
     let measured_s = times.iter().sum::<f64>() / times.len() as f64;
     let off = |laps: &MeanLaps| format!("{:+.2}", laps.lap_s - measured_s);
-    table.push(["lap time, s off".to_owned(), off(&trace.before), off(&trace.after), "0".into()]);
+    table.push([
+        "lap time, s off".to_owned(),
+        off(&trace.before),
+        off(&trace.after),
+        "0".into(),
+    ]);
     for modes in [2, 10] {
-        let distance = |laps: &MeanLaps| distance(laps, &trace.held_out, modes).map_or("-".into(), |d| format!("{d:.2}"));
-        table.push([format!("eq. 8 in {modes} modes"), distance(&trace.before), distance(&trace.after), "-".into()]);
+        let distance = |laps: &MeanLaps| {
+            distance(laps, &trace.held_out, modes).map_or("-".into(), |d| format!("{d:.2}"))
+        };
+        table.push([
+            format!("eq. 8 in {modes} modes"),
+            distance(&trace.before),
+            distance(&trace.after),
+            "-".into(),
+        ]);
     }
     table
 }
@@ -117,7 +158,8 @@ fn error_table(trace: &Trace) -> Table {
 /// Eq. 8 between simulated laps and all held-out laps, in the modes of a PDM of both.
 fn distance(laps: &MeanLaps, runs: &[SampledRun], modes: usize) -> Option<f64> {
     let measured: Vec<Vec<f64>> = runs.iter().flat_map(SampledRun::offsets_m).collect();
-    let simulated = pdm::Cluster::new("simulated", &laps.laps_m[..measured.len().min(laps.laps_m.len())]).ok()?;
+    let simulated =
+        pdm::Cluster::new("simulated", &laps.laps_m[..measured.len().min(laps.laps_m.len())]).ok()?;
     let measured = pdm::Cluster::new("measured", &measured).ok()?;
     let model = pdm::Pdm::fit([&simulated, &measured]).ok()?;
     let project = |cluster| model.project(cluster, pdm::Modes::First(modes)).ok();
@@ -125,22 +167,48 @@ fn distance(laps: &MeanLaps, runs: &[SampledRun], modes: usize) -> Option<f64> {
 }
 
 fn residual(trace: &Trace) -> Vec<Block> {
-    let mut table = Table::new("Four numbers, each with its expectation under the model", &["", "excess", "freedom", "p"]);
+    let mut table = Table::new(
+        "Four numbers, each with its expectation under the model",
+        &["", "excess", "freedom", "p"],
+    );
     let mut rows = |numbers: &FourNumbers, when: &str| {
-        let named = [("mean lap", numbers.mean), ("run to run", numbers.runs), ("drift within runs", numbers.trend), ("noise", numbers.noise)];
+        let named = [
+            ("mean lap", numbers.mean),
+            ("run to run", numbers.runs),
+            ("drift within runs", numbers.trend),
+            ("noise", numbers.noise),
+        ];
         for (name, q) in named {
-            table.push([format!("{name}, {when}"), format!("{:.0}", q.excess()), q.freedom.to_string(), probability(q.p)]);
+            table.push([
+                format!("{name}, {when}"),
+                format!("{:.0}", q.excess()),
+                q.freedom.to_string(),
+                probability(q.p),
+            ]);
         }
     };
     rows(&trace.diagnosis.residual, "declared model");
     if let Some(answer) = trace.diagnosis.explanations.first() {
         rows(&answer.remainder, "with the answer");
     }
-    vec![Block::Table(table), Picture::block("residual_map", "Fig. A", "Where the residual sits: the mean measured lap, coloured by its distance from the declared model's.", residual_map(trace))]
+    vec![
+        Block::Table(table),
+        Picture::block(
+            "residual_map",
+            "Fig. A",
+            "Where the residual sits: the mean measured lap, coloured by its distance from the declared model's.",
+            residual_map(trace),
+        ),
+    ]
 }
 
 fn mean_measured(trace: &Trace) -> Vec<f64> {
-    let laps: Vec<Vec<f64>> = trace.measured.runs.iter().flat_map(SampledRun::offsets_m).collect();
+    let laps: Vec<Vec<f64>> = trace
+        .measured
+        .runs
+        .iter()
+        .flat_map(SampledRun::offsets_m)
+        .collect();
     mean(&laps).unwrap_or_default()
 }
 
@@ -148,19 +216,33 @@ fn residual_map(trace: &Trace) -> Figure {
     let circuit = trace.setup.scene.circuit();
     let measured = mean_measured(trace);
     let mut points = crossings(circuit, &measured);
-    let mut values: Vec<f64> = measured.iter().zip(&trace.before.mean_m).map(|(m, s)| MM * (m - s)).collect();
+    let mut values: Vec<f64> = measured
+        .iter()
+        .zip(&trace.before.mean_m)
+        .map(|(m, s)| MM * (m - s))
+        .collect();
     points.push(points[0]);
     values.push(values[0]);
     let most = values.iter().fold(0.1_f64, |m, v| m.max(v.abs()));
-    let style = Style { width_px: 5.0, ..Style::color(Color::INK) };
-    let marks = vec![walls(&circuit.course), Mark::new("", style, Shape::ColoredLine { points, values })];
+    let style = Style {
+        width_px: 5.0,
+        ..Style::color(Color::INK)
+    };
+    let marks = vec![
+        walls(&circuit.course),
+        Mark::new("", style, Shape::ColoredLine { points, values }),
+    ];
     let mut panel = map("", marks);
     panel.colors = Some(ColorScale {
         label: "measured less simulated, mm (left: positive)".into(),
         map: ColorMap::Diverging,
         range: Some([-most, most]),
     });
-    single("Residual map", "The mean measured lap, coloured by its distance from the declared model's mean lap.", panel)
+    single(
+        "Residual map",
+        "The mean measured lap, coloured by its distance from the declared model's mean lap.",
+        panel,
+    )
 }
 
 fn candidates(trace: &Trace) -> Vec<Block> {
@@ -169,10 +251,20 @@ fn candidates(trace: &Trace) -> Vec<Block> {
     }
     let mut table = Table::new(
         "Explanations fitted to the laps, best first; those marked * cannot be told apart by these laps",
-        &["effect", "log-likelihood gained", "explained", "remainder p", "size"],
+        &[
+            "effect",
+            "log-likelihood gained",
+            "explained",
+            "remainder p",
+            "size",
+        ],
     );
     for (place, e) in trace.diagnosis.explanations.iter().enumerate() {
-        let star = if place < trace.diagnosis.indistinguishable { " *" } else { "" };
+        let star = if place < trace.diagnosis.indistinguishable {
+            " *"
+        } else {
+            ""
+        };
         table.push([
             format!("{}{star}", e.label),
             format!("{:.1}", e.gain),
@@ -185,17 +277,38 @@ fn candidates(trace: &Trace) -> Vec<Block> {
 }
 
 fn sizes(explanation: &Explanation) -> String {
-    explanation.effects.iter().map(describe).collect::<Vec<_>>().join(" + ")
+    explanation
+        .effects
+        .iter()
+        .map(describe)
+        .collect::<Vec<_>>()
+        .join(" + ")
 }
 
 fn before_and_after(trace: &Trace) -> Vec<Block> {
     let measured = mean_measured(trace);
     let curves = [
-        ("measured".to_owned(), measured, line(Color::INK, Dash::Solid, 2.0)),
-        ("declared model".to_owned(), trace.before.mean_m.clone(), line(Color::VERMILLION, Dash::Dashed, 1.6)),
-        ("with the answer".to_owned(), trace.after.mean_m.clone(), line(Color::BLUE, Dash::Solid, 1.6)),
+        (
+            "measured".to_owned(),
+            measured,
+            line(Color::INK, Dash::Solid, 2.0),
+        ),
+        (
+            "declared model".to_owned(),
+            trace.before.mean_m.clone(),
+            line(Color::VERMILLION, Dash::Dashed, 1.6),
+        ),
+        (
+            "with the answer".to_owned(),
+            trace.after.mean_m.clone(),
+            line(Color::BLUE, Dash::Solid, 1.6),
+        ),
     ];
-    let mean_laps = single("Mean laps", "Mean position at each gate: measured, declared model, with the answer.", across(&curves));
+    let mean_laps = single(
+        "Mean laps",
+        "Mean position at each gate: measured, declared model, with the answer.",
+        across(&curves),
+    );
     let circuit = trace.setup.scene.circuit();
     let mut marks = vec![walls(&circuit.course)];
     let closed = |offsets: &[f64]| {
@@ -203,16 +316,58 @@ fn before_and_after(trace: &Trace) -> Vec<Block> {
         points.extend([points[0], chart::GAP]);
         points
     };
-    let measured_laps: Vec<[f64; 2]> =
-        trace.measured.runs.iter().flat_map(|run| run.laps.iter().take(5)).flat_map(|lap: &Lap| closed(&lap.offsets_m)).collect();
-    let few = |laps: &MeanLaps| laps.laps_m.iter().step_by(64).take(10).flat_map(|lap| closed(lap)).collect::<Vec<_>>();
-    let style = |color: Color| Style { width_px: 0.8, opacity: 0.6, ..Style::color(color) };
-    marks.push(Mark::new("measured", style(Color::INK), Shape::Line(measured_laps)));
-    marks.push(Mark::new("declared model", style(Color::VERMILLION), Shape::Line(few(&trace.before))));
-    marks.push(Mark::new("with the answer", style(Color::BLUE), Shape::Line(few(&trace.after))));
-    let laps = single("Laps before and after", "Laps of the declared model and with the answer over the measured ones.", map("", marks));
+    let measured_laps: Vec<[f64; 2]> = trace
+        .measured
+        .runs
+        .iter()
+        .flat_map(|run| run.laps.iter().take(5))
+        .flat_map(|lap: &Lap| closed(&lap.offsets_m))
+        .collect();
+    let few = |laps: &MeanLaps| {
+        laps.laps_m
+            .iter()
+            .step_by(64)
+            .take(10)
+            .flat_map(|lap| closed(lap))
+            .collect::<Vec<_>>()
+    };
+    let style = |color: Color| Style {
+        width_px: 0.8,
+        opacity: 0.6,
+        ..Style::color(color)
+    };
+    marks.push(Mark::new(
+        "measured",
+        style(Color::INK),
+        Shape::Line(measured_laps),
+    ));
+    marks.push(Mark::new(
+        "declared model",
+        style(Color::VERMILLION),
+        Shape::Line(few(&trace.before)),
+    ));
+    marks.push(Mark::new(
+        "with the answer",
+        style(Color::BLUE),
+        Shape::Line(few(&trace.after)),
+    ));
+    let laps = single(
+        "Laps before and after",
+        "Laps of the declared model and with the answer over the measured ones.",
+        map("", marks),
+    );
     vec![
-        Picture::block("mean_laps", "Fig. B", "Mean position at each gate: measured, simulated with the declared model, and with the answer.", mean_laps),
-        Picture::block("laps", "Fig. C", "Laps of the declared model and with the answer, over measured ones.", laps),
+        Picture::block(
+            "mean_laps",
+            "Fig. B",
+            "Mean position at each gate: measured, simulated with the declared model, and with the answer.",
+            mean_laps,
+        ),
+        Picture::block(
+            "laps",
+            "Fig. C",
+            "Laps of the declared model and with the answer, over measured ones.",
+            laps,
+        ),
     ]
 }

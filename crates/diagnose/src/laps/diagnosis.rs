@@ -255,10 +255,9 @@ impl Search<'_> {
     }
 }
 
-/// The screened hypotheses worth a simulation: of each effect the best places, of each place the best pattern.
+/// The screened hypotheses worth a simulation: each probe in its best pattern.
 fn shortlist(screened: &[Screened]) -> Vec<&Screened> {
     const MOST: usize = 7;
-    const OF_ONE_EFFECT: usize = 2;
     let Some(best) = screened.first() else {
         return Vec::new();
     };
@@ -270,7 +269,6 @@ fn shortlist(screened: &[Screened]) -> Vec<&Screened> {
         if list.len() == MOST || hopeless {
             break;
         }
-        let _ = OF_ONE_EFFECT;
         if !seen {
             list.push(candidate);
         }

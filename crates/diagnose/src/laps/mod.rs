@@ -1,8 +1,6 @@
 //! Diagnosis from laps that the camera saw.
 
 mod atlas;
-#[allow(missing_docs)]
-pub mod debug;
 mod diagnosis;
 mod expectation;
 mod hypothesis;

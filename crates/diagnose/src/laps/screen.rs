@@ -7,8 +7,6 @@ use super::hypothesis::{Hypothesis, Part, Shape};
 #[derive(Debug, Clone)]
 pub(super) struct Screened {
     pub(super) hypothesis: Hypothesis,
-    /// What it explains, in white.
-    pub(super) action: White,
     /// Half the squared distance to the residual that is gained, less the price of its parameters.
     pub(super) score: f64,
 }
@@ -113,7 +111,6 @@ impl Atlas {
             hypothesis: Hypothesis {
                 parts: vec![Part::screened(self, probe, shape, &size_at)],
             },
-            action,
             score,
         })
     }

@@ -89,11 +89,6 @@ impl Summary {
             freedom,
         })
     }
-
-    /// Laps in all.
-    pub(super) fn laps(&self) -> usize {
-        self.runs.iter().map(|run| run.laps).sum()
-    }
 }
 
 /// Positions of n laps in their run, centred and of unit norm.

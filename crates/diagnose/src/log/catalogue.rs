@@ -37,7 +37,14 @@ impl Variant {
     fn linear(spec: &'static Spec, values: &[f64], steps: &[(usize, f64)]) -> Self {
         let free: Vec<usize> = steps.iter().map(|s| s.0).collect();
         let steps = steps.iter().map(|s| s.1).collect();
-        Self { spec, shape: Shape::Linear, values: values.to_vec(), sizes: free.clone(), free, steps }
+        Self {
+            spec,
+            shape: Shape::Linear,
+            values: values.to_vec(),
+            sizes: free.clone(),
+            free,
+            steps,
+        }
     }
 
     /// The settings whose columns are taken.
@@ -49,7 +56,9 @@ impl Variant {
         };
         match self.shape {
             Shape::Scan => vec![with(&[])],
-            Shape::Polar => [0.0, 0.25 * TAU].map(|azimuth| with(&[(0, self.steps[0]), (1, azimuth)])).to_vec(),
+            Shape::Polar => [0.0, 0.25 * TAU]
+                .map(|azimuth| with(&[(0, self.steps[0]), (1, azimuth)]))
+                .to_vec(),
             Shape::Linear | Shape::Along => (self.sizes.iter().zip(&self.steps))
                 .map(|(&i, step)| with(&[(i, self.values[i] + step)]))
                 .collect(),
@@ -99,7 +108,9 @@ fn of(spec: &'static Spec, wall_lengths_m: [f64; 2]) -> Vec<Variant> {
             .collect()
     };
     let sensors = |neutral: f64, step: f64| {
-        (0..8).map(|sensor| Variant::linear(spec, &[f64::from(sensor), neutral], &[(1, step)])).collect()
+        (0..8)
+            .map(|sensor| Variant::linear(spec, &[f64::from(sensor), neutral], &[(1, step)]))
+            .collect()
     };
     match spec.name {
         "reading-gain" | "distance-scale" | "response-exponent" => one(1.0, 0.01),
@@ -158,10 +169,13 @@ fn along(spec: &'static Spec, values: &[f64], (size, step): (usize, f64), free: 
 
 /// Places along both walls, about `spacing_m` apart.
 fn places(wall_lengths_m: [f64; 2], spacing_m: f64) -> impl Iterator<Item = (f64, f64)> {
-    wall_lengths_m.into_iter().enumerate().flat_map(move |(wall, length_m)| {
-        let count = (length_m / spacing_m).ceil() as usize;
-        (0..count).map(move |i| (wall as f64, i as f64 / count as f64))
-    })
+    wall_lengths_m
+        .into_iter()
+        .enumerate()
+        .flat_map(move |(wall, length_m)| {
+            let count = (length_m / spacing_m).ceil() as usize;
+            (0..count).map(move |i| (wall as f64, i as f64 / count as f64))
+        })
 }
 
 /// The stage in which a setting shows: that of its effect, or of what an effect without a name acts on.
@@ -202,7 +216,9 @@ pub(crate) fn unlisted_variants() -> Vec<Variant> {
             ("turn", 0.0, 4, 20.0),
             ("time", 0.0, 3, 1.0 / 200.0),
         ] {
-            let Some(dependence) = number(dependences, name) else { continue };
+            let Some(dependence) = number(dependences, name) else {
+                continue;
+            };
             let mut values = vec![target as f64, dependence, basis];
             values.extend(std::iter::repeat_n(0.0, count));
             let free: Vec<usize> = (3..3 + count).collect();
@@ -211,8 +227,17 @@ pub(crate) fn unlisted_variants() -> Vec<Variant> {
                 "heading" => 0,
                 _ => i,
             };
-            let steps = (0..count).map(|i| step * f64::powi(scale, degree(i) as i32)).collect();
-            groups.push(Variant { spec: &UNLISTED, shape: Shape::Linear, values, sizes: free.clone(), free, steps });
+            let steps = (0..count)
+                .map(|i| step * f64::powi(scale, degree(i) as i32))
+                .collect();
+            groups.push(Variant {
+                spec: &UNLISTED,
+                shape: Shape::Linear,
+                values,
+                sizes: free.clone(),
+                free,
+                steps,
+            });
         }
     }
     groups

@@ -20,7 +20,8 @@ pub(crate) fn column(forecast: &mut Forecast<'_>, stage: Stage, trace: &Trace) -
         if matches!(stage, Stage::Sense | Stage::World) {
             let read = forecast.readings_beside(instant.sensed_from, &instant.covariance, &instant.look);
             for lane in (0..8).filter(|&lane| read[lane] != instant.uncut[lane]) {
-                shift[lane + 2] = cut(read[lane], instant.deviation[lane], trace.step_counts).mean - instant.expected[lane];
+                shift[lane + 2] =
+                    cut(read[lane], instant.deviation[lane], trace.step_counts).mean - instant.expected[lane];
             }
         }
         for m in 0..MEASURED {
@@ -34,9 +35,16 @@ pub(crate) fn column(forecast: &mut Forecast<'_>, stage: Stage, trace: &Trace) -
                 change[m] = (missed * instant.per_scale[m]) as f32;
             }
         }
-        dx = [dx[0] - instant.turned.y * dx[2], dx[1] + instant.turned.x * dx[2], dx[2]];
+        dx = [
+            dx[0] - instant.turned.y * dx[2],
+            dx[1] + instant.turned.x * dx[2],
+            dx[2],
+        ];
         if stage == Stage::Act {
-            let moved = difference(forecast.lead(instant.moved_from, instant.command), instant.moved_to);
+            let moved = difference(
+                forecast.lead(instant.moved_from, instant.command),
+                instant.moved_to,
+            );
             (0..3).for_each(|axis| dx[axis] += moved[axis]);
         }
     }

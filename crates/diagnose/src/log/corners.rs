@@ -18,7 +18,10 @@ pub struct Corners {
 }
 
 /// The declared cut.
-pub(crate) const EXACT: Corners = Corners { per_span: 0, before: true };
+pub(crate) const EXACT: Corners = Corners {
+    per_span: 0,
+    before: true,
+};
 
 /// What programs commonly look at.
 const PER_SPAN: [usize; 7] = [50, 64, 100, 128, 200, 256, 500];
@@ -38,7 +41,14 @@ pub(crate) fn recut(
     let mut tried: Vec<(f64, Corners, Scene)> = Vec::new();
     for per_span in PER_SPAN {
         for before in [true, false] {
-            let chain = |side| cut(scene.circuit().course.wall(side), model.wall.max_error_m, per_span, before);
+            let chain = |side| {
+                cut(
+                    scene.circuit().course.wall(side),
+                    model.wall.max_error_m,
+                    per_span,
+                    before,
+                )
+            };
             let chains = [chain(Side::Outer), chain(Side::Inner)];
             // A cut with another number of pieces is another declaration.
             if chains[0].vertices.len() == outer && chains[1].vertices.len() == inner {
@@ -67,15 +77,23 @@ fn cut(wall: &Wall, max_error_m: f64, per_span: usize, before: bool) -> Chain {
     let vertex = |&i: &usize| {
         let nearest = wall.nearest(points[i]);
         let fraction = if i == 0 { 0.0 } else { nearest.fraction };
-        Vertex { position: points[i], left_normal: wall.left_normal(fraction), fraction }
+        Vertex {
+            position: points[i],
+            left_normal: wall.left_normal(fraction),
+            fraction,
+        }
     };
-    Chain { vertices: corners.iter().map(vertex).collect() }
+    Chain {
+        vertices: corners.iter().map(vertex).collect(),
+    }
 }
 
 /// Whether a point in between is farther than that from the chord.
 fn exceeds(points: &[Vec2], max_error_m: f64) -> bool {
     let (a, b) = (points[0], points[points.len() - 1]);
-    let Some(along) = (b - a).try_normalize() else { return false };
+    let Some(along) = (b - a).try_normalize() else {
+        return false;
+    };
     points.iter().any(|p| along.perp_dot(*p - a).abs() > max_error_m)
 }
 
@@ -99,6 +117,11 @@ fn samples(wall: &Wall, per_span: usize) -> Vec<Vec2> {
 /// A point of a span of a uniform cubic b-spline.
 fn basis(p: &[Vec2], u: f64) -> Vec2 {
     let v = 1.0 - u;
-    let weights = [v * v * v, 3.0 * u * u * u - 6.0 * u * u + 4.0, 3.0 * v * v * v - 6.0 * v * v + 4.0, u * u * u];
+    let weights = [
+        v * v * v,
+        3.0 * u * u * u - 6.0 * u * u + 4.0,
+        3.0 * v * v * v - 6.0 * v * v + 4.0,
+        u * u * u,
+    ];
     p.iter().zip(weights).map(|(p, w)| *p * (w / 6.0)).sum()
 }

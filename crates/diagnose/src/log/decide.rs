@@ -58,7 +58,9 @@ pub(crate) fn decided(model: &Model, runs: &[&[LogRow]]) -> Decided {
         return Decided::Unknown;
     }
     let fit = |sloped: bool| -> Vec<Option<Constants>> {
-        (choices.iter()).map(|run| (!run.is_empty()).then(|| constants(model, run, sloped))).collect()
+        (choices.iter())
+            .map(|run| (!run.is_empty()).then(|| constants(model, run, sloped)))
+            .collect()
     };
     let fits = |found: &[Option<Constants>]| found.iter().flatten().all(|run| run.missed <= FORGIVEN);
     let still = fit(false);
@@ -74,13 +76,27 @@ pub(crate) fn decided(model: &Model, runs: &[&[LogRow]]) -> Decided {
     };
     let speed = controller.speed_m_s();
     let changed: Vec<Candidate> = [
-        candidate("controller-gain", &found, |run| (run.parameter.map(|p| p / parameter), run.parameter_error / parameter)),
-        candidate("controller-speed", &found, |run| (run.speed_m_s.map(|v| v / speed), SPEED_ROUNDING_M_S / speed * 0.05)),
+        candidate("controller-gain", &found, |run| {
+            (
+                run.parameter.map(|p| p / parameter),
+                run.parameter_error / parameter,
+            )
+        }),
+        candidate("controller-speed", &found, |run| {
+            (
+                run.speed_m_s.map(|v| v / speed),
+                SPEED_ROUNDING_M_S / speed * 0.05,
+            )
+        }),
     ]
     .into_iter()
     .flatten()
     .collect();
-    if changed.is_empty() { Decided::AsDeclared } else { Decided::Changed(changed) }
+    if changed.is_empty() {
+        Decided::AsDeclared
+    } else {
+        Decided::Changed(changed)
+    }
 }
 
 fn choices(model: &Model, rows: &[LogRow]) -> Vec<Choice> {
@@ -107,15 +123,28 @@ fn constants(model: &Model, run: &[Choice], sloped: bool) -> Constants {
 
 /// V and K by least squares: the mean of the speeds is V, half their difference V K (Sl - Sr).
 fn braitenberg(run: &[Choice], sloped: bool) -> Constants {
-    let mean = line(run.iter().map(|c| (c.time_s, 1.0, 0.5 * (c.left_m_s + c.right_m_s))), sloped);
+    let mean = line(
+        run.iter()
+            .map(|c| (c.time_s, 1.0, 0.5 * (c.left_m_s + c.right_m_s))),
+        sloped,
+    );
     let difference = |c: &Choice| c.left_counts - c.right_counts;
-    let product = line(run.iter().map(|c| (c.time_s, difference(c), 0.5 * (c.left_m_s - c.right_m_s))), sloped);
+    let product = line(
+        run.iter()
+            .map(|c| (c.time_s, difference(c), 0.5 * (c.left_m_s - c.right_m_s))),
+        sloped,
+    );
     let missed = |c: &&Choice| {
         let speed = mean[0] + mean[1] * c.time_s;
         let slope = product[0] + product[1] * c.time_s;
         let turn = slope * difference(c);
-        let allowed = SPEED_ROUNDING_M_S + 2.0 * SUM_ROUNDING_COUNTS * slope.abs() + 2e-4 * speed.abs() * f64::from(u8::from(sloped));
-        (c.left_m_s - speed - turn).abs().max((c.right_m_s - speed + turn).abs()) > allowed
+        let allowed = SPEED_ROUNDING_M_S
+            + 2.0 * SUM_ROUNDING_COUNTS * slope.abs()
+            + 2e-4 * speed.abs() * f64::from(u8::from(sloped));
+        (c.left_m_s - speed - turn)
+            .abs()
+            .max((c.right_m_s - speed + turn).abs())
+            > allowed
     };
     let count = run.len() as f64;
     let spread: f64 = run.iter().map(|c| difference(c).powi(2)).sum();
@@ -131,15 +160,27 @@ fn braitenberg(run: &[Choice], sloped: bool) -> Constants {
 
 /// V from the speeds' size, T from between the sums that turned the robot and those that did not.
 fn rules(run: &[Choice], declared_counts: f64, sloped: bool) -> Constants {
-    let speed = line(run.iter().map(|c| (c.time_s, 1.0, 0.5 * (c.left_m_s.abs() + c.right_m_s.abs()))), sloped);
+    let speed = line(
+        run.iter()
+            .map(|c| (c.time_s, 1.0, 0.5 * (c.left_m_s.abs() + c.right_m_s.abs()))),
+        sloped,
+    );
     let bracket = |slope: f64| {
         let (mut low, mut high) = (0.0_f64, f64::INFINITY);
         for c in run {
             let (turns_left, turns_right) = (c.left_m_s < 0.0, c.right_m_s < 0.0);
             let [right, left] = [c.right_counts, c.left_counts].map(|sum| sum - slope * c.time_s);
-            if turns_left { high = high.min(right) } else { low = low.max(right) }
+            if turns_left {
+                high = high.min(right)
+            } else {
+                low = low.max(right)
+            }
             if !turns_left {
-                if turns_right { high = high.min(left) } else { low = low.max(left) }
+                if turns_right {
+                    high = high.min(left)
+                } else {
+                    low = low.max(left)
+                }
             }
         }
         (low, high)
@@ -151,17 +192,27 @@ fn rules(run: &[Choice], declared_counts: f64, sloped: bool) -> Constants {
         .max_by(|a, b| (bracket(*a).1 - bracket(*a).0).total_cmp(&(bracket(*b).1 - bracket(*b).0)))
         .unwrap_or(0.0);
     let (low, high) = bracket(slope);
-    let inside = (low - 2.0 * SUM_ROUNDING_COUNTS..=high + 2.0 * SUM_ROUNDING_COUNTS).contains(&declared_counts);
-    let threshold = if inside && slope == 0.0 { declared_counts } else { 0.5 * (low + high.min(low + 1e3)) };
+    let inside =
+        (low - 2.0 * SUM_ROUNDING_COUNTS..=high + 2.0 * SUM_ROUNDING_COUNTS).contains(&declared_counts);
+    let threshold = if inside && slope == 0.0 {
+        declared_counts
+    } else {
+        0.5 * (low + high.min(low + 1e3))
+    };
     let missed = |c: &&Choice| {
         let limit = threshold + slope * c.time_s;
-        let near = |sum: f64| (sum - limit).abs() <= 2.0 * SUM_ROUNDING_COUNTS + 0.01 * limit * f64::from(u8::from(sloped));
+        let near = |sum: f64| {
+            (sum - limit).abs() <= 2.0 * SUM_ROUNDING_COUNTS + 0.01 * limit * f64::from(u8::from(sloped))
+        };
         let turns_left = c.right_counts > limit;
         let turns_right = !turns_left && c.left_counts > limit;
         let size = speed[0] + speed[1] * c.time_s;
         let wrong_way = turns_left != (c.left_m_s < 0.0) || turns_right != (c.right_m_s < 0.0);
         let allowed = SPEED_ROUNDING_M_S + 2e-4 * size * f64::from(u8::from(sloped));
-        let wrong_size = (c.left_m_s.abs() - size).abs().max((c.right_m_s.abs() - size).abs()) > allowed;
+        let wrong_size = (c.left_m_s.abs() - size)
+            .abs()
+            .max((c.right_m_s.abs() - size).abs())
+            > allowed;
         wrong_size || wrong_way && !near(c.right_counts) && !near(c.left_counts)
     };
     Constants {
@@ -183,12 +234,22 @@ fn line(points: impl Iterator<Item = (f64, f64, f64)>, sloped: bool) -> Line {
     if !sloped || determinant <= 1e-9 * s[0] * s[2] {
         return [if s[0] > 0.0 { s[3] / s[0] } else { 0.0 }, 0.0];
     }
-    [(s[2] * s[3] - s[1] * s[4]) / determinant, (s[0] * s[4] - s[1] * s[3]) / determinant]
+    [
+        (s[2] * s[3] - s[1] * s[4]) / determinant,
+        (s[0] * s[4] - s[1] * s[3]) / determinant,
+    ]
 }
 
 /// The effect with its factor as it goes over the runs; `None` where it is 1 in all of them.
-fn candidate(name: &str, runs: &[Option<Constants>], factor: impl Fn(&Constants) -> (Line, f64)) -> Option<Candidate> {
-    let factors: Vec<(Line, f64)> = runs.iter().map(|run| run.as_ref().map_or(([1.0, 0.0], 0.0), &factor)).collect();
+fn candidate(
+    name: &str,
+    runs: &[Option<Constants>],
+    factor: impl Fn(&Constants) -> (Line, f64),
+) -> Option<Candidate> {
+    let factors: Vec<(Line, f64)> = runs
+        .iter()
+        .map(|run| run.as_ref().map_or(([1.0, 0.0], 0.0), &factor))
+        .collect();
     let beyond = |value: f64, error: f64| value.abs() > SAME.max(4.0 * error);
     let slopes = factors.iter().any(|(line, _)| line[1].abs() * 300.0 > 5e-3);
     if !slopes && !factors.iter().any(|(line, error)| beyond(line[0] - 1.0, *error)) {
@@ -196,16 +257,35 @@ fn candidate(name: &str, runs: &[Option<Constants>], factor: impl Fn(&Constants)
     }
     let count = factors.len() as f64;
     let mean = |i: usize| factors.iter().map(|(line, _)| line[i]).sum::<f64>() / count;
-    let differ = factors.iter().any(|(line, error)| beyond(line[0] - factors[0].0[0], 2.0 * *error));
-    let error = factors.iter().map(|(_, error)| error).fold(0.0, |a: f64, b| a.max(*b));
+    let differ = factors
+        .iter()
+        .any(|(line, error)| beyond(line[0] - factors[0].0[0], 2.0 * *error));
+    let error = factors
+        .iter()
+        .map(|(_, error)| error)
+        .fold(0.0, |a: f64, b| a.max(*b));
     let spec = find(name).ok()?;
     let (pattern, standard_errors) = if slopes {
-        (Pattern::ByTime { start: vec![mean(0)], per_s: vec![mean(1)] }, vec![error, error / 300.0])
+        (
+            Pattern::ByTime {
+                start: vec![mean(0)],
+                per_s: vec![mean(1)],
+            },
+            vec![error, error / 300.0],
+        )
     } else if differ {
-        (Pattern::ByRun(factors.iter().map(|(line, _)| vec![line[0]]).collect()), factors.iter().map(|(_, e)| *e).collect())
+        (
+            Pattern::ByRun(factors.iter().map(|(line, _)| vec![line[0]]).collect()),
+            factors.iter().map(|(_, e)| *e).collect(),
+        )
     } else {
         (Pattern::Constant(vec![mean(0)]), vec![error])
     };
     let fitted = standard_errors.len();
-    Some(Candidate { setting: Setting { spec, pattern }, standard_errors, gain: f64::INFINITY, fitted })
+    Some(Candidate {
+        setting: Setting { spec, pattern },
+        standard_errors,
+        gain: f64::INFINITY,
+        fitted,
+    })
 }

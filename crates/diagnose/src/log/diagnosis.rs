@@ -13,9 +13,9 @@ use super::evidence::Evidence;
 use super::filter::{MEASURED, Trace};
 use super::noise::noises;
 use super::pairs::pairs;
+use super::refine::jumps;
 use super::rows::LogRow;
 use super::screen::normals;
-use super::refine::jumps;
 use super::search::{By, Lead, Refined, leads, price, pursue, shortlist, tail, together};
 use super::steps::reading_step;
 use crate::{Candidate, Error};
@@ -122,11 +122,19 @@ pub fn diagnose_logs(model: &Model, scene: &Scene, runs: &[&[LogRow]]) -> Result
         return Err(Error::NoLog);
     }
     let first = recut(&scene, model, &wide, &declared, &[]);
-    let mut search = Search::new(declared.elsewhere(first.as_ref().map_or(&scene, |found| &found.1)), step)?;
+    let mut search = Search::new(
+        declared.elsewhere(first.as_ref().map_or(&scene, |found| &found.1)),
+        step,
+    )?;
     let corners = |cut: &Option<(Corners, Scene)>| cut.as_ref().map_or(EXACT, |found| found.0);
-    let Some(leads) = search.alone() else { return Ok(search.answer(decide, corners(&first))) };
+    let Some(leads) = search.alone() else {
+        return Ok(search.answer(decide, corners(&first)));
+    };
     // A large effect blurs where the corners are: they are looked for again beside the best candidate.
-    let settings = search.found.first().map_or(Vec::new(), |best| best.settings.clone());
+    let settings = search
+        .found
+        .first()
+        .map_or(Vec::new(), |best| best.settings.clone());
     let again = recut(&scene, model, &wide, &declared, &settings);
     let better = again.as_ref().map_or(&scene, |found| &found.1);
     if corners(&again) == corners(&first) {
@@ -135,7 +143,11 @@ pub fn diagnose_logs(model: &Model, scene: &Scene, runs: &[&[LogRow]]) -> Result
     }
     let mut renewed = Search::new(declared.elsewhere(better), step)?;
     renewed.p = search.p;
-    renewed.found = search.found.iter().filter_map(|found| renewed.renew(found)).collect();
+    renewed.found = search
+        .found
+        .iter()
+        .filter_map(|found| renewed.renew(found))
+        .collect();
     renewed.sort();
     renewed.finish(&leads);
     Ok(renewed.answer(decide, corners(&again)))
@@ -167,7 +179,10 @@ impl<'a> Search<'a> {
         let lengths_m = [Side::Outer, Side::Inner].map(|side| course.wall(side).length_m());
         let traces = evidence.traces(&[]).ok_or(Error::NoLog)?;
         let base: Vec<f64> = traces.iter().map(|(_, trace)| trace.log_likelihood).collect();
-        let unrounded = Evidence { step_counts: 0.0, ..evidence.elsewhere(evidence.scene) };
+        let unrounded = Evidence {
+            step_counts: 0.0,
+            ..evidence.elsewhere(evidence.scene)
+        };
         let step_gain = match step {
             Some(_) => base.iter().sum::<f64>() - unrounded.likelihood(&[]).unwrap_or(f64::NEG_INFINITY),
             None => 0.0,
@@ -222,24 +237,39 @@ impl<'a> Search<'a> {
         let gains: Vec<f64> = (list.par_iter())
             .map(|lead| {
                 let setting = lead.start(&self.variants[lead.variant]);
-                self.evidence.likelihood(&[setting]).map_or(0.0, |likelihood| likelihood - self.total())
+                self.evidence
+                    .likelihood(&[setting])
+                    .map_or(0.0, |likelihood| likelihood - self.total())
             })
             .collect();
         let best = gains.iter().copied().fold(0.0, f64::max);
-        let keeps = |(lead, gain): &(Lead, f64)| lead.by == By::Run || *gain > 0.2 * best || lead.gain > 0.9 * best;
-        list.into_iter().zip(gains).filter(keeps).map(|(lead, _)| lead).collect()
+        let keeps =
+            |(lead, gain): &(Lead, f64)| lead.by == By::Run || *gain > 0.2 * best || lead.gain > 0.9 * best;
+        list.into_iter()
+            .zip(gains)
+            .filter(keeps)
+            .map(|(lead, _)| lead)
+            .collect()
     }
 
     /// A candidate refined again, from where it is.
     fn renew(&self, found: &Refined) -> Option<Refined> {
-        let variant = self.variants.iter().find(|variant| *variant.spec == *found.settings[0].spec);
+        let variant = self
+            .variants
+            .iter()
+            .find(|variant| *variant.spec == *found.settings[0].spec);
         match (variant, found.by) {
-            (Some(variant), By::Constant) if !jumps(&found.settings[0]) => {
-                together(&self.evidence, &[(variant.clone(), found.settings[0].clone())], self.total())
-            }
+            (Some(variant), By::Constant) if !jumps(&found.settings[0]) => together(
+                &self.evidence,
+                &[(variant.clone(), found.settings[0].clone())],
+                self.total(),
+            ),
             _ => {
                 let gain = self.evidence.likelihood(&found.settings)? - self.total();
-                Some(Refined { gain, ..found.clone() })
+                Some(Refined {
+                    gain,
+                    ..found.clone()
+                })
             }
         }
     }
@@ -260,9 +290,13 @@ impl<'a> Search<'a> {
         /// Log-likelihood that a column may still gain then.
         const LEFT: f64 = 14.0;
         let best = self.found.first().map_or(0.0, Refined::score);
-        let Some(one) = noise.into_iter().max_by(|a, b| a.gain.total_cmp(&b.gain)) else { return };
+        let Some(one) = noise.into_iter().max_by(|a, b| a.gain.total_cmp(&b.gain)) else {
+            return;
+        };
         if one.score() > best.max(4.0) {
-            let left = self.screen(&one.settings).map_or(f64::INFINITY, |(_, leads)| most(&leads));
+            let left = self
+                .screen(&one.settings)
+                .map_or(f64::INFINITY, |(_, leads)| most(&leads));
             if left < LEFT {
                 self.found.push(one);
             }
@@ -271,8 +305,12 @@ impl<'a> Search<'a> {
 
     /// Looks for a second effect beside the best one, and for the best pairs.
     fn second(&mut self, first: &[Lead]) {
-        let Some(best) = self.found.first().cloned() else { return };
-        let Some((traces, leads)) = self.screen(&best.settings) else { return };
+        let Some(best) = self.found.first().cloned() else {
+            return;
+        };
+        let Some((traces, leads)) = self.screen(&best.settings) else {
+            return;
+        };
         self.settle(&traces, &leads, best.gain);
         let noise = noises(&self.evidence, &best.settings, self.total() + best.gain);
         if self.remainder.1.min(by_chance(&noise)) >= 1e-3 {
@@ -280,7 +318,10 @@ impl<'a> Search<'a> {
         }
         let mut more: Vec<Refined> = Vec::new();
         if self.remainder.0 < MATTERS || self.remainder.1 >= 1e-3 {
-            let noise = noise.into_iter().filter(|n| n.gain > 10.0).max_by(|a, b| a.gain.total_cmp(&b.gain));
+            let noise = noise
+                .into_iter()
+                .filter(|n| n.gain > 10.0)
+                .max_by(|a, b| a.gain.total_cmp(&b.gain));
             more.extend(noise.map(|n| n.after(&best)));
         }
         if best.by == By::Constant {
@@ -288,7 +329,9 @@ impl<'a> Search<'a> {
             more.extend(self.joint(first));
         }
         // Each further value must gain ten.
-        more.retain(|pair| pair.gain - best.gain > 10.0 * (pair.fitted.saturating_sub(best.fitted)).max(1) as f64);
+        more.retain(|pair| {
+            pair.gain - best.gain > 10.0 * (pair.fitted.saturating_sub(best.fitted)).max(1) as f64
+        });
         if more.is_empty() {
             return;
         }
@@ -311,12 +354,19 @@ impl<'a> Search<'a> {
     fn beside(&self, best: &Refined, leads: &[Lead]) -> Vec<Refined> {
         let of_best = self.variants.iter().find(|v| *v.spec == *best.settings[0].spec);
         let Some(of_best) = of_best else { return Vec::new() };
-        let constant: Vec<Lead> = leads.iter().filter(|lead| lead.by == By::Constant).cloned().collect();
+        let constant: Vec<Lead> = leads
+            .iter()
+            .filter(|lead| lead.by == By::Constant)
+            .cloned()
+            .collect();
         let list = shortlist(&constant, &self.variants, 3);
         (list.par_iter())
             .filter_map(|lead| {
                 let variant = &self.variants[lead.variant];
-                let parts = [(of_best.clone(), best.settings[0].clone()), (variant.clone(), lead.start(variant))];
+                let parts = [
+                    (of_best.clone(), best.settings[0].clone()),
+                    (variant.clone(), lead.start(variant)),
+                ];
                 together(&self.evidence, &parts, self.total())
             })
             .collect()
@@ -325,12 +375,24 @@ impl<'a> Search<'a> {
     /// The best pairs over the columns of the declared model.
     fn joint(&self, leads: &[Lead]) -> Vec<Refined> {
         const AMONG: usize = 36;
-        let constant: Vec<Lead> = leads.iter().filter(|lead| lead.by == By::Constant).cloned().collect();
-        let list: Vec<usize> = shortlist(&constant, &self.variants, AMONG).iter().map(|lead| lead.variant).collect();
-        let Some(traces) = self.evidence.traces(&[]) else { return Vec::new() };
+        let constant: Vec<Lead> = leads
+            .iter()
+            .filter(|lead| lead.by == By::Constant)
+            .cloned()
+            .collect();
+        let list: Vec<usize> = shortlist(&constant, &self.variants, AMONG)
+            .iter()
+            .map(|lead| lead.variant)
+            .collect();
+        let Some(traces) = self.evidence.traces(&[]) else {
+            return Vec::new();
+        };
         (pairs(&traces, &self.variants, &list, 3).par_iter())
             .filter_map(|pair| {
-                let parts = pair.parts.clone().map(|(i, setting)| (self.variants[i].clone(), setting));
+                let parts = pair
+                    .parts
+                    .clone()
+                    .map(|(i, setting)| (self.variants[i].clone(), setting));
                 together(&self.evidence, &parts, self.total())
             })
             .collect()
@@ -391,20 +453,35 @@ impl<'a> Search<'a> {
             _ => (Stage::Act, "wheel speed"),
         };
         let gain = self.found.first().map_or(0.0, |best| best.gain);
-        Some(UnlistedEffect { stage, acts_on: acts_on.into(), depends_on: "chance".into(), setting: None, gain })
+        Some(UnlistedEffect {
+            stage,
+            acts_on: acts_on.into(),
+            depends_on: "chance".into(),
+            setting: None,
+            gain,
+        })
     }
 
     fn answer(self, decide: Decided, corners: Corners) -> LogDiagnosis {
         let step = self.step.and_then(|counts| {
             let spec = find("reading-step").ok()?;
             let setting = Setting::constant(spec, [counts]);
-            Some(Candidate { setting, standard_errors: vec![2e-4 * counts], gain: self.step_gain, fitted: 1 })
+            Some(Candidate {
+                setting,
+                standard_errors: vec![2e-4 * counts],
+                gain: self.step_gain,
+                fitted: 1,
+            })
         });
         let mut explanations: Vec<LogExplanation> = (self.found.iter().take(12))
             .map(|refined| explanation(refined, step.as_ref()))
             .collect();
         if let (true, Some(step)) = (explanations.is_empty(), step) {
-            explanations.push(LogExplanation { gain: step.gain, price: price(1, By::Constant), effects: vec![step] });
+            explanations.push(LogExplanation {
+                gain: step.gain,
+                price: price(1, By::Constant),
+                effects: vec![step],
+            });
         }
         let matters = self.remainder.1 < 1e-3 && self.remainder.0 > MATTERS;
         let verdict = match (&self.unlisted, explanations.is_empty(), matters) {
@@ -429,15 +506,23 @@ impl<'a> Search<'a> {
 }
 
 fn explanation(refined: &Refined, step: Option<&Candidate>) -> LogExplanation {
-    let own = refined.settings.iter().zip(&refined.standard_errors).map(|(setting, errors)| Candidate {
-        setting: setting.clone(),
-        standard_errors: errors.clone(),
-        gain: refined.gain,
-        fitted: errors.iter().filter(|error| **error > 0.0).count(),
-    });
+    let own = refined
+        .settings
+        .iter()
+        .zip(&refined.standard_errors)
+        .map(|(setting, errors)| Candidate {
+            setting: setting.clone(),
+            standard_errors: errors.clone(),
+            gain: refined.gain,
+            fitted: errors.iter().filter(|error| **error > 0.0).count(),
+        });
     let effects: Vec<Candidate> = step.cloned().into_iter().chain(own).collect();
     let more = step.map_or(0.0, |step| step.gain);
-    LogExplanation { effects, gain: refined.gain + more, price: price(refined.fitted, refined.by) }
+    LogExplanation {
+        effects,
+        gain: refined.gain + more,
+        price: price(refined.fitted, refined.by),
+    }
 }
 
 /// The best score.
@@ -447,7 +532,10 @@ fn most(leads: &[Lead]) -> f64 {
 
 /// Probability that one of the noise effects gains as much by chance.
 fn by_chance(noise: &[Refined]) -> f64 {
-    noise.iter().map(|n| tail(2.0 * n.gain, 1) * 6.0).fold(1.0, f64::min)
+    noise
+        .iter()
+        .map(|n| tail(2.0 * n.gain, 1) * 6.0)
+        .fold(1.0, f64::min)
 }
 
 /// Probability of the best lead by chance, given how many there are.
@@ -476,6 +564,11 @@ fn channels(traces: &[(World<'_>, Trace)]) -> [Channel; MEASURED] {
         let n = count.max(1) as f64;
         let mean_square = sums[0] / n;
         let scale = mean_square.max(1e-12);
-        Channel { count, mean_square, kurtosis: sums[1] / n / (scale * scale), correlation: sums[2] / n / scale }
+        Channel {
+            count,
+            mean_square,
+            kurtosis: sums[1] / n / (scale * scale),
+            correlation: sums[2] / n / scale,
+        }
     })
 }

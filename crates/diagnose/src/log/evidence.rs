@@ -86,17 +86,30 @@ impl<'a> Evidence<'a> {
         step_counts: f64,
     ) -> Result<Self, sim::Error> {
         let pieces: Vec<(usize, &[LogRow])> = (runs.iter().enumerate())
-            .flat_map(|(run, rows)| stretches(rows, &model.run).into_iter().map(move |piece| (run, piece)))
+            .flat_map(|(run, rows)| {
+                stretches(rows, &model.run)
+                    .into_iter()
+                    .map(move |piece| (run, piece))
+            })
             .collect();
         let stretches = pieces
             .into_par_iter()
             .map(|(run, rows)| {
                 let world = scene.world(model, run)?;
                 let first = filter(&world, rows, None, step_counts);
-                Ok(first.map(|trace| Stretch { run, rows, used: clear_readings(&world, &trace, rows) }))
+                Ok(first.map(|trace| Stretch {
+                    run,
+                    rows,
+                    used: clear_readings(&world, &trace, rows),
+                }))
             })
             .collect::<Result<Vec<_>, sim::Error>>()?;
-        Ok(Self { scene, model, stretches: stretches.into_iter().flatten().collect(), step_counts })
+        Ok(Self {
+            scene,
+            model,
+            stretches: stretches.into_iter().flatten().collect(),
+            step_counts,
+        })
     }
 
     /// The runs that gave evidence, in rising order.
@@ -109,7 +122,11 @@ impl<'a> Evidence<'a> {
     /// The part of the evidence that one run gives.
     pub(crate) fn of_run(&self, run: usize) -> Self {
         let stretches = (self.stretches.iter().filter(|stretch| stretch.run == run))
-            .map(|stretch| Stretch { run, rows: stretch.rows, used: stretch.used.clone() })
+            .map(|stretch| Stretch {
+                run,
+                rows: stretch.rows,
+                used: stretch.used.clone(),
+            })
             .collect();
         Self { stretches, ..*self }
     }
@@ -120,7 +137,12 @@ impl<'a> Evidence<'a> {
         'a: 'b,
     {
         let stretches = self.stretches.iter().map(Stretch::clone).collect();
-        Evidence { scene, model: self.model, stretches, step_counts: self.step_counts }
+        Evidence {
+            scene,
+            model: self.model,
+            stretches,
+            step_counts: self.step_counts,
+        }
     }
 
     /// The log-likelihood with these effects added.
@@ -162,11 +184,20 @@ impl<'a> Evidence<'a> {
             })
             .collect();
         let (log_likelihood, normals) = parts?.into_iter().unzip();
-        Some(Assessment { log_likelihood, normals })
+        Some(Assessment {
+            log_likelihood,
+            normals,
+        })
     }
 
     /// Change of the whitened innovations for one step of a knob, from the side that is inside its range.
-    fn derivative(&self, world: &World<'a>, trace: &Trace, settings: &[Setting], knob: &Knob) -> Option<Vec<f32>> {
+    fn derivative(
+        &self,
+        world: &World<'a>,
+        trace: &Trace,
+        settings: &[Setting],
+        knob: &Knob,
+    ) -> Option<Vec<f32>> {
         let run = world.run();
         let mut sign = 1.0;
         let mut turned = knob.turned(settings, 1.0);

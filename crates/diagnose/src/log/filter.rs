@@ -64,7 +64,8 @@ impl State {
     #[inline]
     fn update(&mut self, innovation: f64, slope: [f64; 3], noise_variance: f64) -> (f64, f64, [f64; 3]) {
         let p = &mut self.covariance;
-        let across: [f64; 3] = std::array::from_fn(|i| p[i][0] * slope[0] + p[i][1] * slope[1] + p[i][2] * slope[2]);
+        let across: [f64; 3] =
+            std::array::from_fn(|i| p[i][0] * slope[0] + p[i][1] * slope[1] + p[i][2] * slope[2]);
         let variance = slope[0] * across[0] + slope[1] * across[1] + slope[2] * across[2] + noise_variance;
         let gain = across.map(|a| a / variance);
         for i in 0..3 {
@@ -90,7 +91,11 @@ impl State {
 #[inline]
 pub(crate) fn difference(a: Pose, b: Pose) -> [f64; 3] {
     let way = a.position - b.position;
-    [way.x, way.y, b.heading.perp_dot(a.heading).atan2(b.heading.dot(a.heading))]
+    [
+        way.x,
+        way.y,
+        b.heading.perp_dot(a.heading).atan2(b.heading.dot(a.heading)),
+    ]
 }
 
 /// F P F^T for a displacement that turns with the heading.
@@ -106,20 +111,38 @@ const BURN_IN: usize = 48;
 
 /// Filters one stretch. `used` says for each row what counts; without it all that is there does. `step_counts` is the
 /// step that the readings are rounded to, 0 for none.
-pub(crate) fn filter(world: &World<'_>, rows: &[LogRow], used: Option<&[Used]>, step_counts: f64) -> Option<Trace> {
+pub(crate) fn filter(
+    world: &World<'_>,
+    rows: &[LogRow],
+    used: Option<&[Used]>,
+    step_counts: f64,
+) -> Option<Trace> {
     let mut forecast = Forecast::new(world).ok()?;
     let start = start_pose(rows, &forecast.machine().robot, world.rules())?;
     let mut covariance = [[0.0; 3]; 3];
     (covariance[0][0], covariance[1][1], covariance[2][2]) = (4e-6, 4e-6, 2.5e-3);
-    let mut state = State { pose: start, covariance };
-    let mut trace = Trace { instants: Vec::with_capacity(rows.len()), step_counts, ..Trace::default() };
+    let mut state = State {
+        pose: start,
+        covariance,
+    };
+    let mut trace = Trace {
+        instants: Vec::with_capacity(rows.len()),
+        step_counts,
+        ..Trace::default()
+    };
     for (i, row) in rows.iter().enumerate() {
         forecast.tick(row.time_s);
         let usable = match used {
             Some(used) => used[i],
             None => available(row, i),
         };
-        let instant = step(&mut forecast, &mut state, (row, step_counts), usable, i >= BURN_IN);
+        let instant = step(
+            &mut forecast,
+            &mut state,
+            (row, step_counts),
+            usable,
+            i >= BURN_IN,
+        );
         for m in (0..MEASURED).filter(|m| instant.used >> m & 1 == 1) {
             let e = instant.innovation[m];
             trace.log_likelihood -= 0.5 * e * e - instant.per_scale[m].ln();
@@ -136,7 +159,11 @@ pub(crate) fn filter(world: &World<'_>, rows: &[LogRow], used: Option<&[Used]>, 
 /// What a row has; readings do not guide the very first steps, where the heading is a guess.
 fn available(row: &LogRow, index: usize) -> Used {
     let camera = if row.observed.is_some() { 0b11 } else { 0 };
-    let readings = if row.read().is_some() && index >= BURN_IN / 3 { 0b11_1111_1100 } else { 0 };
+    let readings = if row.read().is_some() && index >= BURN_IN / 3 {
+        0b11_1111_1100
+    } else {
+        0
+    };
     camera | readings
 }
 
@@ -172,7 +199,13 @@ fn step(
     instant.sensed_from = state.pose;
     instant.covariance = state.covariance;
     let outlook = forecast.readings(state.pose, &state.covariance);
-    sense(forecast, state, (row, step_counts, &outlook), usable, &mut instant);
+    sense(
+        forecast,
+        state,
+        (row, step_counts, &outlook),
+        usable,
+        &mut instant,
+    );
     instant.moved_from = state.pose;
     let motion = forecast.motion(state.pose, row.command);
     let mut covariance = carried(&state.covariance, motion.turned);
@@ -182,13 +215,18 @@ fn step(
         }
     }
     (instant.moved_to, instant.turned) = (motion.pose, motion.turned);
-    *state = State { pose: motion.pose, covariance };
+    *state = State {
+        pose: motion.pose,
+        covariance,
+    };
     instant
 }
 
 /// The camera's position.
 fn see(forecast: &Forecast<'_>, state: &mut State, row: &LogRow, usable: Used, instant: &mut Instant) {
-    let Some(observed) = row.observed.filter(|_| usable & 0b11 != 0) else { return };
+    let Some(observed) = row.observed.filter(|_| usable & 0b11 != 0) else {
+        return;
+    };
     // Positions are written to 0.1 mm.
     const ROUNDING_M2: f64 = 1e-8 / 12.0;
     let noise = forecast.machine().camera_noise_m.powi(2) + ROUNDING_M2;
@@ -198,7 +236,8 @@ fn see(forecast: &Forecast<'_>, state: &mut State, row: &LogRow, usable: Used, i
         let already = difference(state.pose, instant.seen_from);
         let expected: f64 = (0..3).map(|axis| slopes[m][axis] * already[axis]).sum();
         instant.slope[m] = slopes[m];
-        (instant.innovation[m], instant.per_scale[m], instant.gain[m]) = state.update(missed - expected, slopes[m], noise);
+        (instant.innovation[m], instant.per_scale[m], instant.gain[m]) =
+            state.update(missed - expected, slopes[m], noise);
     }
 }
 
@@ -207,7 +246,10 @@ fn camera_slopes(forecast: &Forecast<'_>, pose: Pose, seen: Vec2) -> [[f64; 3]; 
     const H: f64 = 1e-5;
     let mut slopes = [[0.0; 3]; 2];
     for axis in 0..3 {
-        let mut moved = State { pose, covariance: [[0.0; 3]; 3] };
+        let mut moved = State {
+            pose,
+            covariance: [[0.0; 3]; 3],
+        };
         let mut by = [0.0; 3];
         by[axis] = H;
         moved.shift(by);
@@ -232,8 +274,9 @@ fn sense(
         let slope = outlook.slope[lane];
         let p = &state.covariance;
         // The variance before the cut holds the pose's share at this moment of the sequence.
-        let pose_variance: f64 =
-            (0..3).map(|i| slope[i] * (p[i][0] * slope[0] + p[i][1] * slope[1] + p[i][2] * slope[2])).sum();
+        let pose_variance: f64 = (0..3)
+            .map(|i| slope[i] * (p[i][0] * slope[0] + p[i][1] * slope[1] + p[i][2] * slope[2]))
+            .sum();
         let own_variance = noise.deviation(outlook.mean[lane]).powi(2) + outlook.edge_variance[lane];
         let deviation = (own_variance + pose_variance).sqrt();
         let read = cut(outlook.mean[lane], deviation, step_counts);
@@ -254,18 +297,24 @@ fn sense(
 /// Which readings the poses of a trace let count: those whose ray is neither near the end of the range nor near the
 /// silhouette of a wall. Decided once, so that every model is judged on the same numbers.
 pub(crate) fn clear_readings(world: &World<'_>, trace: &Trace, rows: &[LogRow]) -> Vec<Used> {
-    let Ok(mut forecast) = Forecast::new(world) else { return vec![0; rows.len()] };
+    let Ok(mut forecast) = Forecast::new(world) else {
+        return vec![0; rows.len()];
+    };
     let range_m = forecast.machine().range_m;
     let still = [[0.0; 3]; 3];
     (trace.instants.iter().zip(rows).enumerate())
         .map(|(i, (instant, row))| {
             let mut used = available(row, i);
             let turned = |by: f64| {
-                let mut state = State { pose: instant.moved_from, covariance: still };
+                let mut state = State {
+                    pose: instant.moved_from,
+                    covariance: still,
+                };
                 state.shift([0.0, 0.0, by]);
                 state.pose
             };
-            let sides = [-SILHOUETTE_RAD, SILHOUETTE_RAD].map(|by| forecast.readings(turned(by), &still).look.distance_m);
+            let sides = [-SILHOUETTE_RAD, SILHOUETTE_RAD]
+                .map(|by| forecast.readings(turned(by), &still).look.distance_m);
             for lane in 0..8 {
                 let at = instant.look.distance_m[lane];
                 let edge = (at - range_m).abs() < EDGE_M + 2.0 * instant.look.deviation_m[lane];

@@ -20,13 +20,21 @@ pub(crate) fn cut(mean: f64, deviation: f64, step: f64) -> Cut {
     }
     let z = mean / deviation;
     if z > 6.0 {
-        return Cut { mean, variance: deviation * deviation, open: 1.0 };
+        return Cut {
+            mean,
+            variance: deviation * deviation,
+            open: 1.0,
+        };
     }
     let open = 0.5 * erfc(-z * std::f64::consts::FRAC_1_SQRT_2);
     let density = (-0.5 * z * z).exp() / std::f64::consts::TAU.sqrt();
     let first = mean * open + deviation * density;
     let second = (mean * mean + deviation * deviation) * open + mean * deviation * density;
-    Cut { mean: first, variance: (second - first * first).max(1e-6 * deviation * deviation), open }
+    Cut {
+        mean: first,
+        variance: (second - first * first).max(1e-6 * deviation * deviation),
+        open,
+    }
 }
 
 /// The same for multiples k of a step, by the probabilities of reaching each.
@@ -67,12 +75,26 @@ mod tests {
 
     #[test]
     fn slope_is_the_open_share_and_far_above_nothing_is_cut() {
-        for (mean, step) in [(-9.0, 0.0), (0.0, 0.0), (4.0, 0.0), (20.0, 0.0), (30.0, 20.0), (100.0, 35.0)] {
+        for (mean, step) in [
+            (-9.0, 0.0),
+            (0.0, 0.0),
+            (4.0, 0.0),
+            (20.0, 0.0),
+            (30.0, 20.0),
+            (100.0, 35.0),
+        ] {
             let h = 1e-4;
             let slope = (cut(mean + h, 8.0, step).mean - cut(mean - h, 8.0, step).mean) / (2.0 * h);
             assert!((slope - cut(mean, 8.0, step).open).abs() < 1e-6, "{mean} {step}");
         }
-        assert_eq!(cut(100.0, 8.0, 0.0), Cut { mean: 100.0, variance: 64.0, open: 1.0 });
+        assert_eq!(
+            cut(100.0, 8.0, 0.0),
+            Cut {
+                mean: 100.0,
+                variance: 64.0,
+                open: 1.0
+            }
+        );
     }
 
     #[test]

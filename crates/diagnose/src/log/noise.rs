@@ -9,6 +9,7 @@ use super::search::{By, Refined};
 pub(crate) fn noises(evidence: &Evidence<'_>, settings: &[Setting], base: f64) -> Vec<Refined> {
     ["slip-level", "camera-noise", "reading-noise"]
         .into_iter()
+        .filter(|name| settings.iter().all(|setting| setting.spec.name != *name))
         .filter_map(|name| factor(evidence, settings, base, find(name).ok()?))
         .collect()
 }
@@ -26,24 +27,41 @@ fn factor(evidence: &Evidence<'_>, settings: &[Setting], base: f64, spec: &'stat
         let (low, high) = (at(middle - half)?, at(middle + half)?);
         let slope = (high - low) / (2.0 * half);
         bend = (high - 2.0 * top + low) / (half * half);
-        let step = if bend < 0.0 { (-slope / bend).clamp(-1.2, 1.2) } else { 0.8 * slope.signum() };
+        let step = if bend < 0.0 {
+            (-slope / bend).clamp(-1.2, 1.2)
+        } else {
+            0.8 * slope.signum()
+        };
         // The best of the three is a start as good as the vertex of their parabola.
-        let tried = [(middle + step, at(middle + step)?), (middle - half, low), (middle + half, high)];
+        let tried = [
+            (middle + step, at(middle + step)?),
+            (middle - half, low),
+            (middle + half, high),
+        ];
         let best = tried.into_iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
         let moved = (best.0 - middle).abs();
         if best.1 > top {
             (middle, top) = best;
         }
-        if bend < 0.0 && (moved < 0.2 * half || step.abs() < 0.2 * half) {
+        if bend < 0.0 && half < 0.03 && (moved < 0.2 * half || step.abs() < 0.2 * half) {
             break;
         }
-        half = (0.5 * half).max(0.01);
+        half = (0.4 * half).max(0.02);
     }
     if middle == 0.0 {
         return None;
     }
     let error = middle.exp() / (-bend).max(1e-9).sqrt();
     let mut all = settings.to_vec();
-    all.push(Setting { spec, pattern: Pattern::Constant(vec![middle.exp()]) });
-    Some(Refined { settings: all, standard_errors: vec![vec![error]], gain: top - base, fitted: 1, by: By::Constant })
+    all.push(Setting {
+        spec,
+        pattern: Pattern::Constant(vec![middle.exp()]),
+    });
+    Some(Refined {
+        settings: all,
+        standard_errors: vec![vec![error]],
+        gain: top - base,
+        fitted: 1,
+        by: By::Constant,
+    })
 }

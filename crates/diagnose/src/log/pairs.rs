@@ -17,7 +17,12 @@ pub(crate) struct Pair {
 }
 
 /// The best pairs among the given variants.
-pub(crate) fn pairs(runs: &[(World<'_>, Trace)], variants: &[Variant], of: &[usize], most: usize) -> Vec<Pair> {
+pub(crate) fn pairs(
+    runs: &[(World<'_>, Trace)],
+    variants: &[Variant],
+    of: &[usize],
+    most: usize,
+) -> Vec<Pair> {
     let (sum, ranges) = gram(runs, variants, of);
     let mut found: Vec<Pair> = Vec::new();
     for i in 0..of.len() {
@@ -31,7 +36,10 @@ pub(crate) fn pairs(runs: &[(World<'_>, Trace)], variants: &[Variant], of: &[usi
             let solution = solve(&left, &right);
             let (mine, yours) = solution.multiples.as_slice().split_at(ranges[i].len());
             let setting = |k: usize, m: &[f64]| (of[k], super::search::start(&variants[of[k]], m));
-            found.push(Pair { gain: solution.gain, parts: [setting(i, mine), setting(j, yours)] });
+            found.push(Pair {
+                gain: solution.gain,
+                parts: [setting(i, mine), setting(j, yours)],
+            });
         }
     }
     found.sort_by(|a, b| b.gain.total_cmp(&a.gain));
@@ -51,7 +59,11 @@ fn diverse(sorted: Vec<Pair>, variants: &[Variant], most: usize) -> Vec<Pair> {
 }
 
 /// Normal equations of all columns of the variants together, and where each variant's columns stand.
-fn gram(runs: &[(World<'_>, Trace)], variants: &[Variant], of: &[usize]) -> (Normal, Vec<std::ops::Range<usize>>) {
+fn gram(
+    runs: &[(World<'_>, Trace)],
+    variants: &[Variant],
+    of: &[usize],
+) -> (Normal, Vec<std::ops::Range<usize>>) {
     let settings: Vec<Vec<Setting>> = of.iter().map(|&i| variants[i].settings()).collect();
     let mut ranges = Vec::new();
     let mut count = 0;
@@ -64,15 +76,21 @@ fn gram(runs: &[(World<'_>, Trace)], variants: &[Variant], of: &[usize]) -> (Nor
         .map(|(world, trace)| {
             let columns: Vec<Vec<f32>> = flat
                 .par_iter()
-                .map(|&setting| match Forecast::beside(world, std::slice::from_ref(setting)) {
-                    Ok(mut forecast) => column(&mut forecast, stage_of(setting), trace),
-                    Err(_) => vec![0.0; trace.instants.len() * super::filter::MEASURED],
-                })
+                .map(
+                    |&setting| match Forecast::beside(world, std::slice::from_ref(setting)) {
+                        Ok(mut forecast) => column(&mut forecast, stage_of(setting), trace),
+                        Err(_) => vec![0.0; trace.instants.len() * super::filter::MEASURED],
+                    },
+                )
                 .collect();
             normal_of(trace, &columns)
         })
         .collect();
     let zero = normal_of(&Trace::default(), &vec![Vec::new(); count]);
-    let total = normals.into_iter().fold(zero, |a, b| Normal { right: a.right + b.right, left: a.left + b.left, ..a });
+    let total = normals.into_iter().fold(zero, |a, b| Normal {
+        right: a.right + b.right,
+        left: a.left + b.left,
+        ..a
+    });
     (total, ranges)
 }

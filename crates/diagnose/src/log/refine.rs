@@ -23,9 +23,12 @@ pub(crate) struct Fitted {
 /// The knobs of one setting of a variant.
 pub(crate) fn knobs(variant: &Variant, setting: usize, pattern: &Pattern) -> Vec<Knob> {
     let step = |value: usize| {
-        let param = &variant.spec.params[value];
-        let along = variant.sizes.iter().position(|&size| size == value && variant.shape != Shape::Scan);
-        match (along, param.name) {
+        let name = variant.spec.params.get(value).map_or("", |param| param.name);
+        let along = variant
+            .sizes
+            .iter()
+            .position(|&size| size == value && variant.shape != Shape::Scan);
+        match (along, name) {
             (Some(i), _) => variant.steps[i],
             (None, "azimuth_rad") => 0.02,
             (None, "position") => 0.002,
@@ -33,10 +36,20 @@ pub(crate) fn knobs(variant: &Variant, setting: usize, pattern: &Pattern) -> Vec
             _ => 0.02 * variant.values[value].abs().max(1e-3),
         }
     };
-    let flat = variant.free.iter().map(|&value| Knob { setting, value, slope: false, step: step(value) });
+    let flat = variant.free.iter().map(|&value| Knob {
+        setting,
+        value,
+        slope: false,
+        step: step(value),
+    });
     if matches!(pattern, Pattern::ByTime { .. }) {
         // A step that changes as much by the middle of a run of a few minutes.
-        let slopes = variant.free.iter().map(|&value| Knob { setting, value, slope: true, step: step(value) / 200.0 });
+        let slopes = variant.free.iter().map(|&value| Knob {
+            setting,
+            value,
+            slope: true,
+            step: step(value) / 200.0,
+        });
         return flat.chain(slopes).collect();
     }
     flat.collect()
@@ -48,7 +61,12 @@ pub(crate) fn jumps(setting: &Setting) -> bool {
 }
 
 /// Gauss and Newton's method on the whitened innovations; a step counts only if the log-likelihood rises.
-pub(crate) fn refine(evidence: &Evidence<'_>, settings: Vec<Setting>, knobs: Vec<Knob>, steps: usize) -> Option<Fitted> {
+pub(crate) fn refine(
+    evidence: &Evidence<'_>,
+    settings: Vec<Setting>,
+    knobs: Vec<Knob>,
+    steps: usize,
+) -> Option<Fitted> {
     let mut settings = settings;
     let mut now = evidence.assess(&settings, &knobs)?;
     for _ in 0..steps {
@@ -63,7 +81,10 @@ pub(crate) fn refine(evidence: &Evidence<'_>, settings: Vec<Setting>, knobs: Vec
             for (knob, multiple) in knobs.iter().zip(solution.multiples.iter()) {
                 trial = knob.turned(&trial, share * multiple);
             }
-            if let Some(then) = evidence.assess(&trial, &knobs).filter(|then| then.total() > now.total()) {
+            if let Some(then) = evidence
+                .assess(&trial, &knobs)
+                .filter(|then| then.total() > now.total())
+            {
                 accepted = Some((trial, then));
                 break;
             }
@@ -81,7 +102,11 @@ pub(crate) fn refine(evidence: &Evidence<'_>, settings: Vec<Setting>, knobs: Vec
 fn fitted(settings: Vec<Setting>, knobs: Vec<Knob>, now: Assessment) -> Fitted {
     let (left, _) = pooled(&now, knobs.len());
     let covariance = left.clone().cholesky().map(|factor| factor.inverse());
-    let error = |i: usize| covariance.as_ref().map_or(f64::INFINITY, |c| c[(i, i)].sqrt() * knobs[i].step);
+    let error = |i: usize| {
+        covariance
+            .as_ref()
+            .map_or(f64::INFINITY, |c| c[(i, i)].sqrt() * knobs[i].step)
+    };
     Fitted {
         standard_errors: (0..knobs.len()).map(error).collect(),
         log_likelihood: now.total(),
@@ -94,9 +119,10 @@ fn fitted(settings: Vec<Setting>, knobs: Vec<Knob>, now: Assessment) -> Fitted {
 
 /// The normal equations of all stretches together.
 pub(crate) fn pooled(assessment: &Assessment, count: usize) -> (DMatrix<f64>, DVector<f64>) {
-    assessment.normals.iter().fold((DMatrix::zeros(count, count), DVector::zeros(count)), |(left, right), normal| {
-        (left + &normal.left, right + &normal.right)
-    })
+    assessment.normals.iter().fold(
+        (DMatrix::zeros(count, count), DVector::zeros(count)),
+        |(left, right), normal| (left + &normal.left, right + &normal.right),
+    )
 }
 
 /// The best size of an effect that jumps: trial sizes about `start`, then ever closer ones.
@@ -105,7 +131,9 @@ pub(crate) fn hunt(evidence: &Evidence<'_>, setting: &Setting, spread: f64) -> O
         let settings = vec![Setting::constant(setting.spec, [size])];
         evidence.assess(&settings, &[]).map(|found| (size, found))
     };
-    let (Pattern::Constant(values), param) = (&setting.pattern, &setting.spec.params[0]) else { return None };
+    let (Pattern::Constant(values), param) = (&setting.pattern, &setting.spec.params[0]) else {
+        return None;
+    };
     let mut best = at(values[0])?;
     let mut spread = spread;
     for _ in 0..rounds(setting) {
@@ -117,12 +145,25 @@ pub(crate) fn hunt(evidence: &Evidence<'_>, setting: &Setting, spread: f64) -> O
         }
         spread *= 0.4;
     }
-    let mut fitted = fitted(vec![Setting::constant(setting.spec, [best.0])], Vec::new(), best.1);
-    fitted.knobs = vec![Knob { setting: 0, value: 0, slope: false, step: spread }];
+    let mut fitted = fitted(
+        vec![Setting::constant(setting.spec, [best.0])],
+        Vec::new(),
+        best.1,
+    );
+    fitted.knobs = vec![Knob {
+        setting: 0,
+        value: 0,
+        slope: false,
+        step: spread,
+    }];
     fitted.standard_errors = vec![spread.max(0.004 * best.0)];
     Some(fitted)
 }
 
 fn rounds(setting: &Setting) -> usize {
-    if setting.spec.name == "command-delay" { 2 } else { 4 }
+    if setting.spec.name == "command-delay" {
+        2
+    } else {
+        4
+    }
 }

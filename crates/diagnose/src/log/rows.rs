@@ -23,7 +23,10 @@ impl LogRow {
 
     /// The readings, where none is missing.
     pub(crate) fn read(&self) -> Option<&Readings> {
-        self.readings.iter().all(|reading| reading.is_finite()).then_some(&self.readings)
+        self.readings
+            .iter()
+            .all(|reading| reading.is_finite())
+            .then_some(&self.readings)
     }
 }
 
@@ -34,12 +37,18 @@ pub(crate) fn stretches<'a>(rows: &'a [LogRow], rules: &RunRules) -> Vec<&'a [Lo
     for i in 0..=rows.len() {
         let broken = i == rows.len()
             || !rows[i].commands()
-            || i > start && (rows[i].time_s - rows[i - 1].time_s - rules.control_step_s).abs() > 0.25 * rules.control_step_s;
+            || i > start
+                && (rows[i].time_s - rows[i - 1].time_s - rules.control_step_s).abs()
+                    > 0.25 * rules.control_step_s;
         if broken {
             if i - start >= SHORTEST {
                 found.push(&rows[start..i]);
             }
-            start = if i < rows.len() && rows[i].commands() { i } else { i + 1 };
+            start = if i < rows.len() && rows[i].commands() {
+                i
+            } else {
+                i + 1
+            };
         }
     }
     found
@@ -60,7 +69,9 @@ pub(crate) fn start_pose(rows: &[LogRow], robot: &Robot, rules: &RunRules) -> Op
         at = robot.roll(at, row.command, rules.control_step_s);
         if pairs.len() >= LEAST_ROWS {
             let count = pairs.len() as f64;
-            let (from, to) = pairs.iter().fold((Vec2::ZERO, Vec2::ZERO), |(a, b), (p, q)| (a + *p, b + *q));
+            let (from, to) = pairs
+                .iter()
+                .fold((Vec2::ZERO, Vec2::ZERO), |(a, b), (p, q)| (a + *p, b + *q));
             let (from, to) = (from / count, to / count);
             let spread_m2: f64 = pairs.iter().map(|(p, _)| p.distance_squared(from)).sum::<f64>() / count;
             if spread_m2.sqrt() > LEAST_SPREAD_M {
@@ -69,8 +80,15 @@ pub(crate) fn start_pose(rows: &[LogRow], robot: &Robot, rules: &RunRules) -> Op
                     sum + Vec2::new(p.dot(q), p.perp_dot(q))
                 });
                 let heading = turn.normalize();
-                let turned = Pose { position: Vec2::ZERO, heading }.rotate(from);
-                return Some(Pose { position: to - turned, heading });
+                let turned = Pose {
+                    position: Vec2::ZERO,
+                    heading,
+                }
+                .rotate(from);
+                return Some(Pose {
+                    position: to - turned,
+                    heading,
+                });
             }
         }
     }

@@ -22,7 +22,10 @@ pub(crate) struct Normal {
 
 /// The normal equations of every variant (outer) in every run (inner).
 pub(crate) fn normals(runs: &[(World<'_>, Trace)], variants: &[Variant]) -> Result<Vec<Vec<Normal>>, Error> {
-    variants.par_iter().map(|variant| runs.iter().map(|run| normal(run, variant)).collect()).collect()
+    variants
+        .par_iter()
+        .map(|variant| runs.iter().map(|run| normal(run, variant)).collect())
+        .collect()
 }
 
 fn normal((world, trace): &(World<'_>, Trace), variant: &Variant) -> Result<Normal, Error> {
@@ -51,7 +54,11 @@ pub(crate) fn normal_of(trace: &Trace, columns: &[Vec<f32>]) -> Normal {
         for a in 0..k {
             let ca = &columns[a][at.clone()];
             // The trace holds what was seen less what was expected, the column the change of that difference.
-            let right = -ca.iter().zip(&instant.innovation).map(|(&c, e)| f64::from(c) * e).sum::<f64>();
+            let right = -ca
+                .iter()
+                .zip(&instant.innovation)
+                .map(|(&c, e)| f64::from(c) * e)
+                .sum::<f64>();
             sum.right[a] += right;
             sum.right_time[a] += right * time_s;
             for b in 0..=a {
@@ -82,7 +89,9 @@ pub(crate) fn solve(left: &DMatrix<f64>, right: &DVector<f64>) -> Solution {
     for i in 0..damped.nrows() {
         damped[(i, i)] += 1e-9 * damped[(i, i)] + 1e-12;
     }
-    let multiples = damped.cholesky().map_or_else(|| DVector::zeros(right.len()), |factor| factor.solve(right));
+    let multiples = damped
+        .cholesky()
+        .map_or_else(|| DVector::zeros(right.len()), |factor| factor.solve(right));
     let gain = 0.5 * multiples.dot(right);
     Solution { multiples, gain }
 }

@@ -95,11 +95,19 @@ fn sums(normals: impl Iterator<Item = Normal>) -> Option<Normal> {
 fn constant(variant: usize, normals: &[Normal]) -> Lead {
     let solution = sums(normals.iter().cloned()).map(|sum| solve(&sum.left, &sum.right));
     let (multiples, gain) = solution.map_or((DVector::zeros(0), 0.0), |s| (s.multiples, s.gain));
-    Lead { variant, by: By::Constant, gain, fitted: multiples.len(), multiples: vec![multiples] }
+    Lead {
+        variant,
+        by: By::Constant,
+        gain,
+        fitted: multiples.len(),
+        multiples: vec![multiples],
+    }
 }
 
 fn by_time(variant: usize, normals: &[Normal]) -> Lead {
-    let Some(sum) = sums(normals.iter().cloned()) else { return constant(variant, normals) };
+    let Some(sum) = sums(normals.iter().cloned()) else {
+        return constant(variant, normals);
+    };
     let k = sum.right.len();
     let mut left = DMatrix::zeros(2 * k, 2 * k);
     left.view_mut((0, 0), (k, k)).copy_from(&sum.left);
@@ -108,12 +116,22 @@ fn by_time(variant: usize, normals: &[Normal]) -> Lead {
     left.view_mut((k, k), (k, k)).copy_from(&sum.left_time);
     let right = DVector::from_iterator(2 * k, sum.right.iter().chain(sum.right_time.iter()).copied());
     let solution = solve(&left, &right);
-    Lead { variant, by: By::Time, gain: solution.gain, fitted: 2 * k, multiples: vec![solution.multiples] }
+    Lead {
+        variant,
+        by: By::Time,
+        gain: solution.gain,
+        fitted: 2 * k,
+        multiples: vec![solution.multiples],
+    }
 }
 
 fn by_run(evidence: &Evidence<'_>, variant: usize, normals: &[Normal], runs: &[usize]) -> Lead {
     let of = |run: usize| {
-        let mine = evidence.stretches.iter().zip(normals).filter(move |(s, _)| s.run == run);
+        let mine = evidence
+            .stretches
+            .iter()
+            .zip(normals)
+            .filter(move |(s, _)| s.run == run);
         sums(mine.map(|(_, n)| n.clone())).map(|sum| solve(&sum.left, &sum.right))
     };
     let solutions: Vec<_> = runs.iter().filter_map(|&run| of(run)).collect();
@@ -134,7 +152,9 @@ pub(crate) fn shortlist(leads: &[Lead], variants: &[Variant], most: usize) -> Ve
     let name = |lead: &Lead| variants[lead.variant].spec.name;
     for lead in sorted {
         let same = list.iter().filter(|other| name(other) == name(lead)).count();
-        let again = list.iter().any(|other| other.variant == lead.variant && other.by <= lead.by);
+        let again = list
+            .iter()
+            .any(|other| other.variant == lead.variant && other.by <= lead.by);
         if same < 2 && !again && list.len() < most {
             list.push(lead.clone());
         }
@@ -170,7 +190,12 @@ impl Refined {
 }
 
 /// Refines a lead. `base` is the log-likelihood of the declared model by stretch.
-pub(crate) fn pursue(evidence: &Evidence<'_>, variant: &Variant, lead: &Lead, base: &[f64]) -> Option<Refined> {
+pub(crate) fn pursue(
+    evidence: &Evidence<'_>,
+    variant: &Variant,
+    lead: &Lead,
+    base: &[f64],
+) -> Option<Refined> {
     const STEPS: usize = 8;
     match lead.by {
         By::Constant => {
@@ -182,9 +207,16 @@ pub(crate) fn pursue(evidence: &Evidence<'_>, variant: &Variant, lead: &Lead, ba
             let k = variant.sizes.len();
             let start = variant.values_at(&lead.multiples[0].as_slice()[..k]);
             let per_s = vec![0.0; start.len()];
-            let setting = Setting { spec: variant.spec, pattern: Pattern::ByTime { start, per_s } };
+            let setting = Setting {
+                spec: variant.spec,
+                pattern: Pattern::ByTime { start, per_s },
+            };
             let knobs = knobs(variant, 0, &setting.pattern);
-            Some(refined(refine(evidence, vec![setting], knobs, STEPS)?, base.iter().sum(), By::Time))
+            Some(refined(
+                refine(evidence, vec![setting], knobs, STEPS)?,
+                base.iter().sum(),
+                By::Time,
+            ))
         }
         By::Run => {
             let runs = evidence.runs();
@@ -213,7 +245,9 @@ fn follow(evidence: &Evidence<'_>, variant: &Variant, setting: Setting, steps: u
 }
 
 fn refined(fitted: Fitted, base: f64, by: By) -> Refined {
-    let standard_errors = (fitted.settings.iter().enumerate()).map(|(i, setting)| spread_errors(setting, i, &fitted)).collect();
+    let standard_errors = (fitted.settings.iter().enumerate())
+        .map(|(i, setting)| spread_errors(setting, i, &fitted))
+        .collect();
     Refined {
         gain: fitted.log_likelihood - base,
         fitted: fitted.knobs.len(),
@@ -226,15 +260,30 @@ fn refined(fitted: Fitted, base: f64, by: By) -> Refined {
 /// Standard errors in the order of the pattern's values, 0 where a value was not fitted.
 fn spread_errors(setting: &Setting, number: usize, fitted: &Fitted) -> Vec<f64> {
     let count = setting.spec.params.len();
-    let slots = if matches!(setting.pattern, Pattern::ByTime { .. }) { 2 * count } else { count };
+    let slots = if matches!(setting.pattern, Pattern::ByTime { .. }) {
+        2 * count
+    } else {
+        count
+    };
     let mut errors = vec![0.0; slots];
-    for (knob, error) in fitted.knobs.iter().zip(&fitted.standard_errors).filter(|(knob, _)| knob.setting == number) {
+    for (knob, error) in fitted
+        .knobs
+        .iter()
+        .zip(&fitted.standard_errors)
+        .filter(|(knob, _)| knob.setting == number)
+    {
         errors[knob.value + if knob.slope { count } else { 0 }] = *error;
     }
     errors
 }
 
-fn by_runs(evidence: &Evidence<'_>, variant: &Variant, runs: &[usize], parts: &[Fitted], base: &[f64]) -> Refined {
+fn by_runs(
+    evidence: &Evidence<'_>,
+    variant: &Variant,
+    runs: &[usize],
+    parts: &[Fitted],
+    base: &[f64],
+) -> Refined {
     let mut values = vec![variant.values.clone(); runs.last().map_or(0, |last| last + 1)];
     let mut errors = Vec::new();
     for (&run, part) in runs.iter().zip(parts) {
@@ -245,7 +294,10 @@ fn by_runs(evidence: &Evidence<'_>, variant: &Variant, runs: &[usize], parts: &[
     }
     let base: f64 = (evidence.stretches.iter().zip(base)).map(|(_, base)| base).sum();
     Refined {
-        settings: vec![Setting { spec: variant.spec, pattern: Pattern::ByRun(values) }],
+        settings: vec![Setting {
+            spec: variant.spec,
+            pattern: Pattern::ByRun(values),
+        }],
         standard_errors: vec![errors],
         gain: parts.iter().map(|part| part.log_likelihood).sum::<f64>() - base,
         fitted: parts.iter().map(|part| part.knobs.len()).sum(),

@@ -21,7 +21,9 @@ pub(crate) fn reading_step(runs: &[&[LogRow]]) -> Option<f64> {
     }
     let smallest = readings.iter().copied().fold(f64::INFINITY, f64::min);
     // The smallest reading is the step itself or a small multiple of it, so the step is a fraction of it.
-    let guess = (1..=12).map(|k| smallest / f64::from(k)).find(|&step| step > 0.45 && fits(&some, step))?;
+    let guess = (1..=12)
+        .map(|k| smallest / f64::from(k))
+        .find(|&step| step > 0.45 && fits(&some, step))?;
     Some(sharpened(&readings, guess))
 }
 
@@ -64,7 +66,12 @@ mod tests {
                 let raw = |lane: usize| f64::from(i * 7 % 977) * 0.731 + lane as f64 * 13.3;
                 let rounded = |x: f64| if step > 0.0 { (x / step).round() * step } else { x };
                 let readings = std::array::from_fn(|lane| (10.0 * rounded(raw(lane))).round() / 10.0);
-                LogRow { time_s: 0.064 * f64::from(i), observed: None, readings, command: WheelSpeeds::default() }
+                LogRow {
+                    time_s: 0.064 * f64::from(i),
+                    observed: None,
+                    readings,
+                    command: WheelSpeeds::default(),
+                }
             })
             .collect()
     }

@@ -112,11 +112,7 @@ impl Pairs {
                 .zip(labels)
                 .map(|(distance, &label)| if label == labels[i] { *distance } else { 0.0 })
                 .sum();
-            *(if labels[i] {
-                &mut within_x
-            } else {
-                &mut within_y
-            }) += same;
+            *(if labels[i] { &mut within_x } else { &mut within_y }) += same;
         }
         let nx = labels.iter().filter(|&&label| label).count() as f64;
         let ny = labels.len() as f64 - nx;
@@ -183,12 +179,8 @@ mod tests {
 
     #[test]
     fn value_stability() {
-        let (x, y) = (
-            cluster("x", &gaussian(1, 6, 2)),
-            cluster("y", &gaussian(2, 5, 2)),
-        );
-        let counts =
-            [1, 2].map(|seed| (energy_test(&x, &y, 999, seed).unwrap().p * 1000.0).round());
+        let (x, y) = (cluster("x", &gaussian(1, 6, 2)), cluster("y", &gaussian(2, 5, 2)));
+        let counts = [1, 2].map(|seed| (energy_test(&x, &y, 999, seed).unwrap().p * 1000.0).round());
         assert_eq!(counts, [443.0, 462.0]);
     }
 

@@ -64,8 +64,7 @@ fn at_gate(x: &Cluster, y: &Cluster, gate: usize) -> Option<f64> {
         let laps = cluster.len() as f64;
         (mean, sum / (laps - 1.0) / laps, zero_variance(&column))
     });
-    let (difference, squared_error, zero) =
-        (mean_x - mean_y, error_x + error_y, zero_x.max(zero_y));
+    let (difference, squared_error, zero) = (mean_x - mean_y, error_x + error_y, zero_x.max(zero_y));
     match squared_error > zero {
         true => Some(difference / squared_error.sqrt()),
         false if difference * difference <= zero => Some(0.0),
@@ -104,10 +103,7 @@ mod tests {
         let (x, y) = (still("x", 0.3), still("y", 0.7));
         assert_eq!(standardised_differences(&x, &x).unwrap(), [0.0, 0.0]);
         let refusal = standardised_differences(&x, &y).unwrap_err().to_string();
-        assert_eq!(
-            refusal,
-            "`x` and `y` differ at gate 2 and neither varies there"
-        );
+        assert_eq!(refusal, "`x` and `y` differ at gate 2 and neither varies there");
     }
 
     #[test]

@@ -68,10 +68,7 @@ mod tests {
             (1e30, 7, 20, 1.4183862686157224e-298),
         ] {
             let is = upper_tail(ratio, df1, df2);
-            assert!(
-                close(is, p, 1e-11),
-                "{ratio} {df1} {df2}: {is:e} should be {p:e}"
-            );
+            assert!(close(is, p, 1e-11), "{ratio} {df1} {df2}: {is:e} should be {p:e}");
         }
         assert_eq!(upper_tail(0.0, 2, 7), 1.0);
     }
@@ -80,10 +77,7 @@ mod tests {
     fn in_two_modes_the_tail_is_a_power() {
         for ratio in [1e-6, 0.1, 1.0, 20.0, 1000.0] {
             for df2 in [1, 2, 37, 97, 1997] {
-                let [is, should] = [
-                    upper_tail(ratio, 2, df2),
-                    (1.0 + ratio).powf(-0.5 * df2 as f64),
-                ];
+                let [is, should] = [upper_tail(ratio, 2, df2), (1.0 + ratio).powf(-0.5 * df2 as f64)];
                 assert!(
                     close(is, should, 1e-10),
                     "{ratio} {df2}: {is:e} should be {should:e}"
@@ -109,9 +103,8 @@ mod tests {
 
     #[test]
     fn all_modes_leave_a_degree_of_freedom() {
-        let laps = |name: &str, seed| {
-            Cluster::new(name, &crate::samples::rows(&gaussian(seed, 5, 40))).unwrap()
-        };
+        let laps =
+            |name: &str, seed| Cluster::new(name, &crate::samples::rows(&gaussian(seed, 5, 40))).unwrap();
         let (x, y) = (laps("x", 1), laps("y", 2));
         let pdm = Pdm::fit([&x, &y]).unwrap();
         let [x, y] = [x, y].map(|cluster| pdm.project(&cluster, Modes::All).unwrap());
