@@ -33,6 +33,7 @@ macro_rules! words {
         #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
         pub(crate) enum $name { $(#[serde(rename = $word)] $variant),+ }
 
+        #[allow(dead_code, reason = "not every enum of the file needs every function")]
         impl $name {
             /// The words of the file, in the order of the variants.
             pub(crate) const NAMES: &[&str] = &[$($word),+];

@@ -1,17 +1,16 @@
 //! Laps at the gates, from files and from simulations.
 
-use std::path::Path;
 use std::sync::Arc;
 
 use anyhow::{Context, Result, bail};
 use pdm::Cluster;
 use rayon::prelude::*;
-use sim::{Circuit, Drive, Streams, Vec2};
+use sim::{Circuit, Drive, Vec2};
 use track::{Lap, LapTracker, Way};
 
 use crate::config::Config;
 use crate::dataset::{DataSet, RunFile};
-use crate::setup::{self, Setup};
+use crate::setup;
 
 /// The laps of one run that are analysed, and what was set aside.
 #[derive(Debug, Clone)]
@@ -106,16 +105,6 @@ pub(crate) struct Measured {
 }
 
 impl Measured {
-    /// The laps of a data set on its circuit.
-    ///
-    /// # Errors
-    /// A world that cannot be found, a run without a whole lap after its first.
-    pub(crate) fn new(set: DataSet, world: Option<&Path>) -> Result<Self> {
-        let config = set.declared_config(&Config::shipped())?;
-        let circuit = setup::circuit(&set.world_source(world)?, config.run.gates)?;
-        Self::on(set, circuit)
-    }
-
     /// The laps of a data set on a circuit that is at hand.
     ///
     /// # Errors
@@ -176,33 +165,6 @@ fn sample(set: &DataSet, run: &RunFile, circuit: &Circuit, way: Way) -> Result<S
         );
     }
     Ok(sampled)
-}
-
-/// Simulates several runs, in parallel; run `i` has the streams of run `i`.
-///
-/// # Errors
-/// What the simulator refuses.
-pub(crate) fn simulate(
-    setup: &Setup,
-    name: &str,
-    seed: u64,
-    runs: usize,
-    laps: usize,
-) -> Result<Vec<SampledRun>> {
-    (0..runs)
-        .into_par_iter()
-        .map(|run| {
-            let drive = setup.drive(
-                Streams {
-                    seed,
-                    run: run as u64,
-                },
-                laps,
-                |_| {},
-            )?;
-            Ok(simulated(name, run, &drive, laps))
-        })
-        .collect()
 }
 
 /// The sampled laps of a simulated run.

@@ -50,15 +50,6 @@ impl Progress {
             Sink::Lines(lines) => lines.message(message),
         }
     }
-
-    /// Prints a line of its own on stderr, without tearing the bar; not with `--quiet`.
-    pub(crate) fn note(&self, line: &str) {
-        match &self.0 {
-            Sink::Silent => {}
-            Sink::Bar(bar) => bar.suspend(|| write_line(&mut std::io::stderr(), line)),
-            Sink::Lines(_) => write_line(&mut std::io::stderr(), line),
-        }
-    }
 }
 
 impl Drop for Progress {

@@ -73,11 +73,6 @@ impl ModelFile {
         Ok(())
     }
 
-    /// The text of the file, without what `--set` changed.
-    pub(crate) fn text(&self) -> &str {
-        &self.document.text
-    }
-
     /// The line of a dotted key in the file, from 1; `None` where it is left out.
     pub(crate) fn line_of(&self, key: &str) -> Option<usize> {
         self.document.line_of(key)

@@ -173,6 +173,9 @@ struct Search<'a> {
     steps: usize,
 }
 
+/// Every run in its world, filtered, and the leads over them.
+type Screened<'a> = (Vec<(World<'a>, Trace)>, Vec<Lead>);
+
 impl<'a> Search<'a> {
     fn new(evidence: Evidence<'a>, step: Option<f64>) -> Result<Self, Error> {
         let course = &evidence.scene.circuit().course;
@@ -207,7 +210,7 @@ impl<'a> Search<'a> {
     }
 
     /// The screening of all variants at given settings.
-    fn screen(&self, settings: &[Setting]) -> Option<(Vec<(World<'a>, Trace)>, Vec<Lead>)> {
+    fn screen(&self, settings: &[Setting]) -> Option<Screened<'a>> {
         let traces = self.evidence.traces(settings)?;
         let normals = normals(&traces, &self.variants).ok()?;
         let leads = leads(&self.evidence, &self.variants, &normals);

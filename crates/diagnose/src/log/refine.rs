@@ -13,11 +13,8 @@ pub(crate) struct Fitted {
     pub(crate) settings: Vec<Setting>,
     pub(crate) knobs: Vec<Knob>,
     pub(crate) log_likelihood: f64,
-    /// By stretch.
-    pub(crate) by_stretch: Vec<f64>,
     /// Standard error of each knob's value.
     pub(crate) standard_errors: Vec<f64>,
-    pub(crate) last: Option<Assessment>,
 }
 
 /// The knobs of one setting of a variant.
@@ -72,7 +69,7 @@ pub(crate) fn refine(
     for _ in 0..steps {
         let (left, right) = pooled(&now, knobs.len());
         let solution = solve(&left, &right);
-        if !(solution.gain > 0.02) {
+        if solution.gain.is_nan() || solution.gain <= 0.02 {
             break;
         }
         let mut accepted = None;
@@ -110,10 +107,8 @@ fn fitted(settings: Vec<Setting>, knobs: Vec<Knob>, now: Assessment) -> Fitted {
     Fitted {
         standard_errors: (0..knobs.len()).map(error).collect(),
         log_likelihood: now.total(),
-        by_stretch: now.log_likelihood.clone(),
         settings,
         knobs,
-        last: Some(now),
     }
 }
 

@@ -259,11 +259,10 @@ fn refined(fitted: Fitted, base: f64, by: By) -> Refined {
 
 /// Standard errors in the order of the pattern's values, 0 where a value was not fitted.
 fn spread_errors(setting: &Setting, number: usize, fitted: &Fitted) -> Vec<f64> {
-    let count = setting.spec.params.len();
-    let slots = if matches!(setting.pattern, Pattern::ByTime { .. }) {
-        2 * count
-    } else {
-        count
+    let (count, slots) = match &setting.pattern {
+        Pattern::ByTime { start, .. } => (start.len(), 2 * start.len()),
+        Pattern::Constant(values) => (values.len(), values.len()),
+        Pattern::ByRun(runs) => (runs[0].len(), runs[0].len()),
     };
     let mut errors = vec![0.0; slots];
     for (knob, error) in fitted
