@@ -4,7 +4,7 @@ use serde_json::Value;
 
 use crate::support::{Scratch, measured};
 
-const COMMANDS: [&str; 7] = [
+const COMMANDS: [&str; 9] = [
     "reproduce",
     "drive",
     "compare",
@@ -12,6 +12,8 @@ const COMMANDS: [&str; 7] = [
     "world",
     "fit-sensor",
     "effects",
+    "trace",
+    "bench",
 ];
 
 #[test]
