@@ -1,6 +1,8 @@
 //! What might explain a residual.
 
-use sim::Setting;
+use sim::{Pattern, Setting, Stage, UNLISTED};
+
+use crate::Cause;
 
 /// An effect that might explain what the model lacks, with its fitted size.
 #[derive(Debug, Clone, PartialEq)]
@@ -14,4 +16,36 @@ pub struct Candidate {
     pub gain: f64,
     /// Number of fitted values.
     pub fitted: usize,
+}
+
+impl Candidate {
+    /// The stage of the loop in which it acts.
+    pub fn stage(&self) -> Stage {
+        Cause::of(&self.setting).map_or(self.setting.spec.stage, |cause| cause.stage)
+    }
+
+    /// The effect with what tells it from others of its name (a sensor, a place), and its pattern.
+    pub fn label(&self) -> String {
+        let (values, pattern) = match &self.setting.pattern {
+            Pattern::Constant(values) => (values, ""),
+            Pattern::ByRun(runs) => (&runs[0], ", by run"),
+            Pattern::ByTime { start, .. } => (start, ", by time"),
+        };
+        let spec = self.setting.spec;
+        let fixed: Vec<String> = (spec.params.iter().zip(values))
+            .filter(|(param, _)| param.neutral.is_none() && (spec.params.len() > 1 || *spec == UNLISTED))
+            .map(|(param, value)| match param.choices.get(*value as usize) {
+                Some(choice) if *spec == UNLISTED => format!("{} {choice}", param.name.replace('_', " ")),
+                Some(choice) => (*choice).to_owned(),
+                None if param.whole => format!("{} {value}", param.name),
+                None => format!("{} {value:.2}", param.name),
+            })
+            .collect();
+        let fixed = if fixed.is_empty() {
+            String::new()
+        } else {
+            format!(" ({})", fixed.join(", "))
+        };
+        format!("{}{fixed}{pattern}", spec.name)
+    }
 }

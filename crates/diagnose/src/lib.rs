@@ -1,5 +1,6 @@
 //! What a model lacks: fits of its parts to measurements.
 
+mod answer;
 mod candidate;
 mod error;
 mod laps;
@@ -7,11 +8,9 @@ mod least_squares;
 mod log;
 mod response_fit;
 
+pub use answer::{Answer, Cause, Explanation, Verdict};
 pub use candidate::Candidate;
 pub use error::Error;
-pub use laps::{Atlas, Diagnosis, Explanation, FourNumbers, Quadratic, Simulate, Verdict};
-pub use log::{
-    Channel, Corners, Decided, LogDiagnosis, LogExplanation, LogRow, LogVerdict, UnlistedEffect,
-    diagnose_logs,
-};
+pub use laps::{Atlas, FourNumbers, LapDiagnosis, Quadratic, Simulate};
+pub use log::{Channel, Corners, Decided, LogDiagnosis, LogRow, diagnose_logs};
 pub use response_fit::{Estimate, ResponseFit};

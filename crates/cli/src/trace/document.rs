@@ -1,46 +1,56 @@
 //! `trace.json`.
 
-use diagnose::{Candidate, Explanation, FourNumbers, Quadratic, Verdict};
+use diagnose::{Candidate, Cause, Decided, Explanation, FourNumbers, Quadratic, Verdict};
 use serde_json::{Value, json};
 use sim::Pattern;
 
 use super::Trace;
+use super::answer::{FromLogs, rivals};
 
 /// Half width of a 95 % interval in standard errors.
 const HALF_WIDTH_95: f64 = 1.96;
 
 /// The document of a trace.
 pub(crate) fn document(trace: &Trace) -> Value {
-    let diagnosis = &trace.diagnosis;
-    let answer = match diagnosis.verdict {
-        Verdict::Faithful | Verdict::Unexplained => None,
-        _ => diagnosis.explanations.first(),
-    };
-    let rivals = &diagnosis.explanations[..diagnosis.indistinguishable];
+    let answer = &trace.answer;
+    let claimed = answer.claimed();
+    let rivals = rivals(answer);
     let sets: Vec<Vec<&str>> = distinct(rivals.iter().map(Explanation::names));
-    json!({
-        "verdict": verdict(diagnosis.verdict),
-        "residual": residual(&diagnosis.residual, answer),
-        "effects": answer.map_or_else(Vec::new, |a| effects(a, rivals)),
+    let mut document = json!({
+        "verdict": answer.verdict.name(),
+        "residual": residual(trace),
+        "effects": claimed.map_or_else(Vec::new, |a| effects(a, rivals)),
         "alternative_sets": if sets.len() > 1 { sets } else { Vec::new() },
         "error": {
             "metric": "rms over the gates of the difference between the mean lateral position of simulated laps and of a held-out run, m",
             "before": trace.before_m, "after": trace.after_m, "floor": trace.floor_m,
             "held_out": trace.held_out.iter().map(|run| run.name.clone()).collect::<Vec<_>>(),
         },
-        "candidates": diagnosis.explanations.iter().map(candidate).collect::<Vec<_>>(),
+        "candidates": answer.explanations.iter().map(candidate).collect::<Vec<_>>(),
         "separate_with": Vec::<Value>::new(),
         "laps_simulated": trace.laps_simulated,
-    })
+    });
+    if let Some(found) = &trace.from_logs {
+        document["logs"] = logs(found);
+    }
+    document
 }
 
-pub(crate) fn verdict(verdict: Verdict) -> &'static str {
-    match verdict {
-        Verdict::Faithful => "faithful",
-        Verdict::Explained => "explained",
-        Verdict::PartlyExplained => "partly explained",
-        Verdict::Unexplained => "unexplained",
-    }
+/// What the logs say by themselves, and whether the laps agree.
+fn logs(found: &FromLogs) -> Value {
+    let logs = &found.logs;
+    let (decide, effects, share) = match &logs.decide {
+        Decided::AsDeclared => ("as declared", Vec::new(), None),
+        Decided::Changed(effects) => ("changed", effects.iter().map(one_effect).collect(), None),
+        Decided::NoController { share } => ("no controller of this kind", Vec::new(), Some(*share)),
+        Decided::Unknown => ("unknown", Vec::new(), None),
+    };
+    json!({
+        "decide": { "verdict": decide, "effects": effects, "commands_unexplained": share },
+        "p": logs.p, "control_steps": logs.steps,
+        "confirmed_by_laps": found.confirmed,
+        "laps_after": found.after.as_ref().map(four),
+    })
 }
 
 fn quadratic(q: &Quadratic) -> Value {
@@ -54,7 +64,9 @@ fn four(numbers: &FourNumbers) -> Value {
     })
 }
 
-fn residual(numbers: &FourNumbers, answer: Option<&Explanation>) -> Value {
+fn residual(trace: &Trace) -> Value {
+    const SIGNIFICANT_P: f64 = 0.002;
+    let numbers = &trace.residual;
     let named = [
         ("mean", numbers.mean),
         ("runs", numbers.runs),
@@ -63,14 +75,22 @@ fn residual(numbers: &FourNumbers, answer: Option<&Explanation>) -> Value {
     ];
     let places: Vec<&str> = named
         .iter()
-        .filter(|(_, q)| q.p < 0.002)
+        .filter(|(_, q)| q.p < SIGNIFICANT_P)
         .map(|(name, _)| *name)
         .collect();
+    let stage = match (&trace.answer.cause, trace.answer.claimed()) {
+        (Some(cause), _) => Some(cause.stage),
+        (None, Some(claimed)) => claimed.effects.first().map(Candidate::stage),
+        (None, None) => None,
+    };
+    let p = trace.from_logs.as_ref().map_or(1.0, |found| found.logs.p);
     json!({
-        "stage": answer.map(|a| a.effects[0].setting.spec.stage.name()),
-        "significant": numbers.omnibus_p() < 0.002,
-        "p": numbers.omnibus_p(),
+        "stage": stage.map(sim::Stage::name),
+        "significant": trace.answer.verdict != Verdict::Faithful,
+        "p": numbers.omnibus_p().min(p),
         "where": places,
+        "acts_on": trace.answer.cause.as_ref().map(|cause| &cause.acts_on),
+        "depends_on": trace.answer.cause.as_ref().map(|cause| &cause.depends_on),
         "numbers": four(numbers),
     })
 }
@@ -86,16 +106,30 @@ fn effects(answer: &Explanation, rivals: &[Explanation]) -> Vec<Value> {
         let mut alternatives: Vec<&str> = others.collect();
         alternatives.sort_unstable();
         alternatives.dedup();
-        json!({
-            "name": name,
-            "stage": effect.setting.spec.stage.name(),
-            "parameters": parameters(effect),
-            "by": by(effect),
-            "share": answer.share / count,
-            "alternatives": alternatives,
-        })
+        let mut entry = one_effect(effect);
+        entry["share"] = json!(answer.share / count);
+        entry["alternatives"] = json!(alternatives);
+        entry
     };
     answer.effects.iter().enumerate().map(effect).collect()
+}
+
+/// An effect by itself; one without a name says what it acts on and depends on.
+fn one_effect(effect: &Candidate) -> Value {
+    let mut entry = json!({
+        "name": effect.setting.spec.name,
+        "stage": effect.stage().name(),
+        "parameters": parameters(effect),
+        "by": by(effect),
+    });
+    if let (Some(cause), Pattern::Constant(values)) = (Cause::of(&effect.setting), &effect.setting.pattern) {
+        entry["acts_on"] = json!(cause.acts_on);
+        entry["depends_on"] = json!(cause.depends_on);
+        entry["basis"] = json!(effect.setting.spec.params[2].choices[values[2] as usize]);
+        entry["coefficients"] = json!(values[3..]);
+        entry["standard_errors"] = json!(effect.standard_errors.get(3..));
+    }
+    entry
 }
 
 fn by(effect: &Candidate) -> Value {
@@ -163,10 +197,10 @@ fn parameters(effect: &Candidate) -> Vec<Value> {
 
 fn candidate(explanation: &Explanation) -> Value {
     json!({
-        "names": explanation.names(), "label": explanation.label,
+        "names": explanation.names(), "label": explanation.label(),
         "score": explanation.score, "gain": explanation.gain, "share": explanation.share,
         "parameters": explanation.effects.iter().map(parameters).collect::<Vec<_>>(),
-        "remainder": four(&explanation.remainder), "remainder_p": explanation.remainder.omnibus_p(),
+        "remainder": explanation.remainder.as_ref().map(four), "remainder_p": explanation.remainder_p,
     })
 }
 

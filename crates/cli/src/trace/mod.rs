@@ -1,5 +1,6 @@
 //! From measured laps to what the model lacks.
 
+mod answer;
 mod cache;
 mod document;
 mod error;
@@ -8,9 +9,10 @@ mod pages;
 use std::path::Path;
 
 use anyhow::{Context, Result, ensure};
-use diagnose::{Atlas, Diagnosis};
+use diagnose::{Answer, Atlas, FourNumbers};
 use sim::{Setting, Streams};
 
+use answer::{FromLogs, from_logs, log_rows};
 pub(crate) use cache::Cache;
 pub(crate) use document::document;
 pub(crate) use error::{MeanLaps, mean};
@@ -29,7 +31,12 @@ pub(crate) struct Trace {
     pub(crate) config: Config,
     pub(crate) setup: Setup,
     pub(crate) measured: Measured,
-    pub(crate) diagnosis: Diagnosis,
+    /// How the laps depart from the declared model.
+    pub(crate) residual: FourNumbers,
+    /// What is claimed.
+    pub(crate) answer: Answer,
+    /// What the robot's logs say, where there are logs.
+    pub(crate) from_logs: Option<FromLogs>,
     /// The runs that errors are measured on.
     pub(crate) held_out: Vec<SampledRun>,
     pub(crate) before: MeanLaps,
@@ -74,18 +81,28 @@ impl Trace {
         let setup = Setup::new(&config, circuit, None)?;
         let shape: Vec<usize> = measured.runs.iter().map(|run| run.laps.len()).collect();
         let simulate = |effects: &[Setting], set: u64| data_set(&setup, effects, session.seed(), set, &shape);
-        let atlas = atlas(session, &config, &source.text, &shape, cache, &simulate)?;
-        interrupt::check()?;
         let laps: Vec<Vec<track::Lap>> = measured.runs.iter().map(|run| run.laps.clone()).collect();
-        let progress = session.progress("naming the effect", 1);
-        let diagnosis = atlas.diagnose(&simulate, &laps)?;
-        progress.tick(1);
-        drop(progress);
+        let (residual, answer, from_logs) = match log_rows(&measured.set) {
+            Some(rows) => {
+                let progress = session.progress("judging the laps and following the logs", Atlas::null_sets());
+                let atlas = Atlas::without_effects(&simulate, &|| progress.tick(1))?;
+                let found = from_logs(&setup, &rows, &atlas, &simulate, &laps)?;
+                (found.before, found.answer(), Some(found))
+            }
+            None => {
+                let atlas = atlas(session, &config, &source.text, &shape, cache, &simulate)?;
+                interrupt::check()?;
+                let progress = session.progress("naming the effect", 1);
+                let found = atlas.diagnose(&simulate, &laps)?;
+                progress.tick(1);
+                (found.residual, found.answer, None)
+            }
+        };
         interrupt::check()?;
 
         let wanted = shape.iter().copied().max().unwrap_or(20).max(20);
         let before = MeanLaps::new(&setup, &[], session.seed(), wanted)?;
-        let settings = answer(&diagnosis);
+        let settings = answer.settings();
         let after = MeanLaps::new(&setup, &settings, session.seed(), wanted)?;
         let mean_over = |values: Vec<f64>| values.iter().sum::<f64>() / values.len() as f64;
         let (held_out, after_m) = match held_out {
@@ -97,7 +114,7 @@ impl Trace {
                 let without = measured
                     .runs
                     .iter()
-                    .zip(&diagnosis.left_out)
+                    .zip(&answer.left_out)
                     .map(|(run, effects)| {
                         Ok(MeanLaps::new(&setup, effects, session.seed(), wanted)?.distance_m(run))
                     });
@@ -112,7 +129,9 @@ impl Trace {
             config,
             setup,
             measured,
-            diagnosis,
+            residual,
+            answer,
+            from_logs,
             held_out,
             before,
             after,
@@ -128,20 +147,8 @@ impl Trace {
         let mut config = self.config.clone();
         config
             .effect
-            .extend(answer(&self.diagnosis).iter().map(setup::effect_table));
+            .extend(self.answer.settings().iter().map(setup::effect_table));
         config
-    }
-}
-
-/// The effects of the answer: none where no name would be honest.
-pub(crate) fn answer(diagnosis: &Diagnosis) -> Vec<Setting> {
-    match diagnosis.verdict {
-        diagnose::Verdict::Faithful | diagnose::Verdict::Unexplained => Vec::new(),
-        _ => diagnosis
-            .explanations
-            .first()
-            .map(diagnose::Explanation::settings)
-            .unwrap_or_default(),
     }
 }
 

@@ -6,7 +6,6 @@ use diagnose::{Explanation, FourNumbers, Verdict};
 use sim::Pattern;
 use track::Lap;
 
-use super::document::verdict;
 use super::{MeanLaps, Trace, mean};
 use crate::experiments::{Block, Picture, Section};
 use crate::figures::{MM, across, crossings, line, map, single, walls};
@@ -40,7 +39,7 @@ pub(crate) fn sections(trace: &Trace) -> Result<Vec<Section>> {
 
 /// The answer in sentences.
 pub(crate) fn summary(trace: &Trace) -> String {
-    let diagnosis = &trace.diagnosis;
+    let diagnosis = &trace.answer;
     let answer = diagnosis.explanations.first();
     let said = match (diagnosis.verdict, answer) {
         (Verdict::Faithful, _) => {
@@ -51,22 +50,22 @@ pub(crate) fn summary(trace: &Trace) -> String {
         }
         (v, Some(answer)) => {
             let what: Vec<String> = answer.effects.iter().map(describe).collect();
-            let rest = if v == Verdict::Explained && answer.remainder.omnibus_p() < 0.001 {
+            let rest = if v == Verdict::Explained && answer.remainder_p < 0.001 {
                 " What remains is significant but small."
             } else if v == Verdict::PartlyExplained {
                 " What remains is significant and matters."
             } else {
                 " Nothing significant remains."
             };
-            let mut word = verdict(v).to_owned();
+            let mut word = v.name().to_owned();
             word[..1].make_ascii_uppercase();
             format!("{word}: {}; this explains {:.1} % of the excess.{rest}", what.join(" and "), 100.0 * answer.share)
         }
     };
-    let rivals: Vec<&str> = diagnosis.explanations[..diagnosis.indistinguishable]
+    let rivals: Vec<String> = diagnosis.explanations[..diagnosis.indistinguishable]
         .iter()
         .skip(1)
-        .map(|e| e.label.as_str())
+        .map(Explanation::label)
         .collect();
     let alternatives = if rivals.is_empty() {
         String::new()
@@ -187,9 +186,9 @@ fn residual(trace: &Trace) -> Vec<Block> {
             ]);
         }
     };
-    rows(&trace.diagnosis.residual, "declared model");
-    if let Some(answer) = trace.diagnosis.explanations.first() {
-        rows(&answer.remainder, "with the answer");
+    rows(&trace.residual, "declared model");
+    if let Some(remainder) = trace.answer.explanations.first().and_then(|a| a.remainder.as_ref()) {
+        rows(remainder, "with the answer");
     }
     vec![
         Block::Table(table),
@@ -246,7 +245,7 @@ fn residual_map(trace: &Trace) -> Figure {
 }
 
 fn candidates(trace: &Trace) -> Vec<Block> {
-    if trace.diagnosis.explanations.is_empty() {
+    if trace.answer.explanations.is_empty() {
         return vec![Block::Text("Nothing had to be tried.".into())];
     }
     let mut table = Table::new(
@@ -259,17 +258,17 @@ fn candidates(trace: &Trace) -> Vec<Block> {
             "size",
         ],
     );
-    for (place, e) in trace.diagnosis.explanations.iter().enumerate() {
-        let star = if place < trace.diagnosis.indistinguishable {
+    for (place, e) in trace.answer.explanations.iter().enumerate() {
+        let star = if place < trace.answer.indistinguishable {
             " *"
         } else {
             ""
         };
         table.push([
-            format!("{}{star}", e.label),
+            format!("{}{star}", e.label()),
             format!("{:.1}", e.gain),
             format!("{:.1} %", 100.0 * e.share),
-            probability(e.remainder.omnibus_p()),
+            probability(e.remainder_p),
             sizes(e),
         ]);
     }

@@ -46,6 +46,22 @@ impl Atlas {
     /// # Errors
     /// A declared model that does not complete its laps.
     pub fn new(simulate: &Simulate<'_>, tick: &(dyn Fn() + Sync)) -> Result<Self, Error> {
+        Self::with_probes(simulate, probes(), tick)
+    }
+
+    /// An atlas that knows no effect: enough to judge laps by, not to name what they lack.
+    ///
+    /// # Errors
+    /// As [`Atlas::new`].
+    pub fn without_effects(simulate: &Simulate<'_>, tick: &(dyn Fn() + Sync)) -> Result<Self, Error> {
+        Self::with_probes(simulate, Vec::new(), tick)
+    }
+
+    fn with_probes(
+        simulate: &Simulate<'_>,
+        probes: Vec<Probe>,
+        tick: &(dyn Fn() + Sync),
+    ) -> Result<Self, Error> {
         let null: Vec<Summary> = (0..NULL_SETS)
             .into_par_iter()
             .map(|set| {
@@ -62,7 +78,7 @@ impl Atlas {
             scatter,
             samples,
             laps,
-            probes: probes(),
+            probes,
             paths: Vec::new(),
         };
         let same_draws = Expectation::of(null[..PROBE_SETS as usize].iter(), true);
@@ -132,6 +148,11 @@ impl Atlas {
     /// Number of data sets that [`Atlas::new`] simulates.
     pub fn sets() -> u64 {
         NULL_SETS + PROBE_SETS * probes().iter().map(|probe| probe.sizes.len() as u64).sum::<u64>()
+    }
+
+    /// Number of data sets that [`Atlas::without_effects`] simulates.
+    pub fn null_sets() -> u64 {
+        NULL_SETS
     }
 
     /// Time of a lap, s.

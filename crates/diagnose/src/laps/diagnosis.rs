@@ -1,16 +1,17 @@
 //! The answer: which effects, how sure, what else it could be.
 
 use rayon::prelude::*;
+
 use sim::Setting;
 
 use super::atlas::{Atlas, Simulate, White, observed};
 use super::expectation::Expectation;
-use super::hypothesis::{Hypothesis, Shape};
+use super::hypothesis::Hypothesis;
 use super::refine::{Descended, Refined};
 use super::screen::Screened;
 use super::summary::Summary;
 use super::tests_of_fit::FourNumbers;
-use crate::{Candidate, Error};
+use crate::{Answer, Candidate, Error, Explanation, Verdict};
 
 /// Score of the best probe from which a data set counts as departing from the declared model, whatever the omnibus says.
 const ALARM_SCORE: f64 = 7.0;
@@ -25,70 +26,25 @@ const ALTERNATIVE: f64 = 5.0;
 /// Log-likelihood that each number of a further effect must gain.
 const WORTH: f64 = 10.0;
 
-/// How much of the residual is explained.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Verdict {
-    /// Nothing significant is left out of the declared model.
-    Faithful,
-    /// The effects leave nothing that matters.
-    Explained,
-    /// They help; a remainder is significant and matters.
-    PartlyExplained,
-    /// No name would be honest.
-    Unexplained,
-}
-
-/// One explanation that was tried to the end.
+/// An explanation and what simulates it.
 #[derive(Debug, Clone)]
-pub struct Explanation {
-    /// The effects with their sizes.
-    pub effects: Vec<Candidate>,
-    /// What they are, for a reader.
-    pub label: String,
+struct Found {
     hypothesis: Hypothesis,
-    /// Log-likelihood gained over the declared model less the price of the fitted numbers.
-    pub score: f64,
-    /// Log-likelihood gained.
-    pub gain: f64,
-    /// Share of the excess over the declared model's expectation that it explains.
-    pub share: f64,
-    /// What remains.
-    pub remainder: FourNumbers,
+    explanation: Explanation,
 }
 
-impl Explanation {
-    /// Whether it leaves nothing significant, or next to nothing.
-    fn suffices(&self) -> bool {
-        self.remainder.omnibus_p() >= SIGNIFICANT_P || self.share >= ENOUGH
-    }
-
-    /// The effects as the simulator takes them.
-    pub fn settings(&self) -> Vec<Setting> {
-        self.effects.iter().map(|effect| effect.setting.clone()).collect()
-    }
-
-    /// The effects' names.
-    pub fn names(&self) -> Vec<&'static str> {
-        self.effects
-            .iter()
-            .map(|effect| effect.setting.spec.name)
-            .collect()
-    }
+/// Whether an explanation leaves nothing significant, or next to nothing.
+fn suffices(explanation: &Explanation) -> bool {
+    explanation.remainder_p >= SIGNIFICANT_P || explanation.share >= ENOUGH
 }
 
 /// What laps tell about a model.
 #[derive(Debug, Clone)]
-pub struct Diagnosis {
-    /// In a word.
-    pub verdict: Verdict,
+pub struct LapDiagnosis {
     /// How the data depart from the declared model.
     pub residual: FourNumbers,
-    /// Every explanation that was tried to the end, best first; the first is the answer, if there is one.
-    pub explanations: Vec<Explanation>,
-    /// How many of these the data do not tell apart, from the first on.
-    pub indistinguishable: usize,
-    /// For each run the answer's effects with sizes fitted to the other runs alone.
-    pub left_out: Vec<Vec<Setting>>,
+    /// What is claimed.
+    pub answer: Answer,
 }
 
 impl Atlas {
@@ -96,7 +52,7 @@ impl Atlas {
     ///
     /// # Errors
     /// Runs of fewer than three laps, or of another shape than the atlas was made for.
-    pub fn diagnose(&self, simulate: &Simulate<'_>, runs: &[Vec<track::Lap>]) -> Result<Diagnosis, Error> {
+    pub fn diagnose(&self, simulate: &Simulate<'_>, runs: &[Vec<track::Lap>]) -> Result<LapDiagnosis, Error> {
         let summary = Summary::new(runs).ok_or(Error::TooFewLaps)?;
         let data = observed(&summary);
         let residual = self.white(&data, &self.null);
@@ -104,12 +60,9 @@ impl Atlas {
         let screened = self.screen(&residual);
         let alarm = numbers.omnibus_p() < ALARM_P || self.best_score(&residual) > ALARM_SCORE;
         if !alarm {
-            return Ok(Diagnosis {
-                verdict: Verdict::Faithful,
+            return Ok(LapDiagnosis {
                 residual: numbers,
-                explanations: Vec::new(),
-                indistinguishable: 0,
-                left_out: vec![Vec::new(); runs.len()],
+                answer: Answer::faithful(runs.len()),
             });
         }
         let search = Search {
@@ -118,38 +71,67 @@ impl Atlas {
             data: &data,
             residual: &residual,
         };
-        let mut explanations = search.singles(&screened);
-        if explanations
+        let mut found = search.singles(&screened);
+        if found
             .first()
-            .is_none_or(|best| best.remainder.omnibus_p() < SIGNIFICANT_P)
+            .is_none_or(|best| best.explanation.remainder_p < SIGNIFICANT_P)
         {
             let pairs = search.pairs();
-            explanations = search.weigh(explanations, pairs);
+            found = search.weigh(found, pairs);
         }
-        let verdict = match explanations.first() {
-            Some(best) if best.suffices() => Verdict::Explained,
+        let verdict = match found.first().map(|best| &best.explanation) {
+            Some(best) if suffices(best) => Verdict::Explained,
             Some(best) if best.share >= 0.8 => Verdict::PartlyExplained,
             _ => Verdict::Unexplained,
         };
-        let indistinguishable = explanations.first().map_or(0, |best| {
-            explanations
+        let indistinguishable = found.first().map_or(0, |best| {
+            found
                 .iter()
-                .take_while(|e| e.score > best.score - ALTERNATIVE && e.effects.len() == best.effects.len())
+                .map(|f| &f.explanation)
+                .take_while(|e| {
+                    e.score > best.explanation.score - ALTERNATIVE
+                        && e.effects.len() == best.explanation.effects.len()
+                })
                 .count()
         });
-        let answer = explanations.first().filter(|_| verdict != Verdict::Unexplained);
+        let answer = found.first().filter(|_| verdict != Verdict::Unexplained);
         let left_out = match answer {
             Some(answer) if runs.len() > 1 => self.leave_out(simulate, runs, &answer.hypothesis)?,
-            Some(answer) => vec![answer.settings(); runs.len()],
+            Some(answer) => vec![answer.explanation.settings(); runs.len()],
             None => vec![Vec::new(); runs.len()],
         };
-        Ok(Diagnosis {
-            verdict,
+        Ok(LapDiagnosis {
             residual: numbers,
-            explanations,
-            indistinguishable,
-            left_out,
+            answer: Answer {
+                verdict,
+                explanations: found.into_iter().map(|f| f.explanation).collect(),
+                indistinguishable,
+                left_out,
+                cause: None,
+            },
         })
+    }
+}
+
+impl Atlas {
+    /// What the laps of several runs leave of an answer that they were not asked for: how they depart from the
+    /// declared model, and from the model with these effects; the latter is `None` where the robot then crashes.
+    ///
+    /// # Errors
+    /// Runs of fewer than three laps, or of another shape than the atlas was made for.
+    pub fn confirm(
+        &self,
+        simulate: &Simulate<'_>,
+        runs: &[Vec<track::Lap>],
+        effects: &[Setting],
+    ) -> Result<(FourNumbers, Option<FourNumbers>), Error> {
+        let data = observed(&Summary::new(runs).ok_or(Error::TooFewLaps)?);
+        let before = FourNumbers::new(&self.white(&data, &self.null), &self.laps);
+        if effects.is_empty() {
+            return Ok((before, Some(before)));
+        }
+        let after = self.remainder(simulate, &data, effects);
+        Ok((before, after.map(|residual| FourNumbers::new(&residual, &self.laps))))
     }
 }
 
@@ -163,19 +145,19 @@ struct Search<'a> {
 
 impl Search<'_> {
     /// The best single effects, tried to the end.
-    fn singles(&self, screened: &[Screened]) -> Vec<Explanation> {
+    fn singles(&self, screened: &[Screened]) -> Vec<Found> {
         self.try_all(shortlist(screened).iter().map(|s| &s.hypothesis))
     }
 
     /// The best pairs, tried to the end.
-    fn pairs(&self) -> Vec<Explanation> {
+    fn pairs(&self) -> Vec<Found> {
         const PAIRS: usize = 6;
         let pairs = self.atlas.screen_pairs(self.residual, PAIRS);
         self.try_all(pairs.iter().map(|pair| &pair.hypothesis))
     }
 
     /// Descends from every hypothesis, then settles those that may still be the best.
-    fn try_all<'h>(&self, hypotheses: impl Iterator<Item = &'h Hypothesis>) -> Vec<Explanation> {
+    fn try_all<'h>(&self, hypotheses: impl Iterator<Item = &'h Hypothesis>) -> Vec<Found> {
         const ROUNDS: usize = 3;
         // What lies this far behind after its descent does not come back.
         const BEHIND: f64 = 25.0;
@@ -188,31 +170,31 @@ impl Search<'_> {
             .iter()
             .map(|d| d.score)
             .fold(f64::NEG_INFINITY, f64::max);
-        let mut explanations: Vec<Explanation> = descended
+        let mut explanations: Vec<Found> = descended
             .par_iter()
             .filter(|d| d.score >= best - BEHIND.max(0.02 * best))
             .filter_map(|d| self.atlas.settle(self.simulate, self.data, d))
             .map(|refined| self.explanation(&refined))
             .collect();
-        explanations.sort_by(|a, b| b.score.total_cmp(&a.score));
+        explanations.sort_by(|a, b| b.explanation.score.total_cmp(&a.explanation.score));
         explanations
     }
 
     /// Singles and pairs in order of what they are worth: a pair comes before a single effect only if each number of its
     /// further effect gains enough and it fits where the single does not.
-    fn weigh(&self, singles: Vec<Explanation>, pairs: Vec<Explanation>) -> Vec<Explanation> {
+    fn weigh(&self, singles: Vec<Found>, pairs: Vec<Found>) -> Vec<Found> {
         let (Some(single), Some(pair)) = (singles.first(), pairs.first()) else {
             return if singles.is_empty() { pairs } else { singles };
         };
-        let count = |e: &Explanation| e.effects.iter().map(|c| c.fitted).sum::<usize>();
+        let count = |f: &Found| f.explanation.effects.iter().map(|c| c.fitted).sum::<usize>();
         let further = count(pair).saturating_sub(count(single)).max(1) as f64;
-        let wins = pair.gain - single.gain > WORTH * further && pair.suffices();
+        let wins = pair.explanation.gain - single.explanation.gain > WORTH * further && suffices(&pair.explanation);
         let (mut first, second) = if wins { (pairs, singles) } else { (singles, pairs) };
         first.extend(second);
         first
     }
 
-    fn explanation(&self, refined: &Refined) -> Explanation {
+    fn explanation(&self, refined: &Refined) -> Found {
         let atlas = self.atlas;
         let settings = refined.hypothesis.settings(atlas);
         let effects = settings
@@ -229,28 +211,18 @@ impl Search<'_> {
                 }
             })
             .collect();
-        let labels: Vec<String> = refined
-            .hypothesis
-            .parts
-            .iter()
-            .map(|part| {
-                let pattern = match part.shape {
-                    Shape::Constant => "",
-                    Shape::ByRun => ", by run",
-                    Shape::ByTime => ", by time",
-                };
-                atlas.probes[part.probe].label() + pattern
-            })
-            .collect();
         let excess = |squares: f64| squares - self.residual.len() as f64;
-        Explanation {
-            effects,
-            label: labels.join(" + "),
+        let remainder = FourNumbers::new(&refined.residual, &atlas.laps);
+        Found {
             hypothesis: refined.hypothesis.clone(),
-            score: refined.score,
-            gain: refined.gain,
-            share: 1.0 - excess(refined.residual.norm_squared()) / excess(self.residual.norm_squared()),
-            remainder: FourNumbers::new(&refined.residual, &atlas.laps),
+            explanation: Explanation {
+                effects,
+                score: refined.score,
+                gain: refined.gain,
+                share: 1.0 - excess(refined.residual.norm_squared()) / excess(self.residual.norm_squared()),
+                remainder_p: remainder.omnibus_p(),
+                remainder: Some(remainder),
+            },
         }
     }
 }

@@ -12,5 +12,5 @@ mod summary;
 mod tests_of_fit;
 
 pub use atlas::{Atlas, Simulate};
-pub use diagnosis::{Diagnosis, Explanation, Verdict};
+pub use diagnosis::LapDiagnosis;
 pub use tests_of_fit::{FourNumbers, Quadratic};

@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
-use sim::Setting;
+use sim::{Pattern, Setting};
 
 use super::atlas::{Atlas, Simulate, White, observed, summary, white};
 use super::expectation::{Expectation, Scatter};
@@ -193,15 +193,36 @@ impl Atlas {
         })
     }
 
+    /// What effects leave of the data, in units of their own scatter; `None` where the robot crashes.
+    pub(super) fn remainder(
+        &self,
+        simulate: &Simulate<'_>,
+        data: &Expectation,
+        effects: &[Setting],
+    ) -> Option<White> {
+        let alike = !effects.iter().any(|e| matches!(e.pattern, Pattern::ByRun(_)));
+        let end = self.simulated(simulate, effects, alike, FINAL_SETS)?;
+        let scatter = Scatter::of_laps(end.summaries.iter(), &self.scatter)?;
+        Some(white(&scatter, &self.laps, data, &end.expectation) / (1.0 + end.error).sqrt())
+    }
+
     /// Simulates a hypothesis. What the draws of these data sets did to the declared model is taken off as far as it
     /// helps (a control variate).
     fn evaluate(&self, simulate: &Simulate<'_>, hypothesis: &Hypothesis, sets: u64) -> Option<Evaluated> {
-        let settings = hypothesis.settings(self);
+        self.simulated(simulate, &hypothesis.settings(self), hypothesis.alike(), sets)
+    }
+
+    fn simulated(
+        &self,
+        simulate: &Simulate<'_>,
+        settings: &[Setting],
+        alike: bool,
+        sets: u64,
+    ) -> Option<Evaluated> {
         let summaries: Vec<Summary> = (0..sets)
             .into_par_iter()
-            .map(|set| summary(simulate, &settings, set))
+            .map(|set| summary(simulate, settings, set))
             .collect::<Option<_>>()?;
-        let alike = hypothesis.alike();
         let mean = Expectation::of(summaries.iter(), alike);
         let declared = &self.samples[..sets as usize];
         let declared_mean = Expectation::mean(declared, alike);

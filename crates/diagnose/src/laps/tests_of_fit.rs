@@ -68,6 +68,14 @@ impl FourNumbers {
         }
     }
 
+    /// What exceeds the expectation in all four together.
+    pub fn excess(&self) -> f64 {
+        [self.mean, self.runs, self.trend, self.noise]
+            .iter()
+            .map(Quadratic::excess)
+            .sum()
+    }
+
     /// Probability that the smallest of the four is as small as it is: four times that (Bonferroni).
     pub fn omnibus_p(&self) -> f64 {
         let least = [self.mean, self.runs, self.trend, self.noise]

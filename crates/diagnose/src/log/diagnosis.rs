@@ -3,10 +3,10 @@
 use std::sync::Arc;
 
 use rayon::prelude::*;
-use sim::{Model, Scene, Setting, Stage, UNLISTED, World, find};
+use sim::{Model, Pattern, Scene, Setting, Stage, World, find};
 use track::Side;
 
-use super::catalogue::{Variant, stage_of, unlisted_variants, variants};
+use super::catalogue::{Variant, unlisted_variants, variants};
 use super::corners::{Corners, EXACT, recut};
 use super::decide::{Decided, decided};
 use super::evidence::Evidence;
@@ -18,53 +18,7 @@ use super::rows::LogRow;
 use super::screen::normals;
 use super::search::{By, Lead, Refined, leads, price, pursue, shortlist, tail, together};
 use super::steps::reading_step;
-use crate::{Candidate, Error};
-
-/// What is said in the end of everything but the controller, which [`LogDiagnosis::decide`] judges.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum LogVerdict {
-    /// Nothing significant is left out of the declared model.
-    Faithful,
-    /// The effects named leave nothing that matters.
-    Explained,
-    /// They help, and a significant remainder matters.
-    PartlyExplained,
-    /// No listed effect would be an honest name.
-    Unlisted,
-}
-
-/// Effects that together explain the logs to some degree.
-#[derive(Debug, Clone, PartialEq)]
-pub struct LogExplanation {
-    /// The effects with their values; each one's gain is that of all of them together.
-    pub effects: Vec<Candidate>,
-    /// Log-likelihood gained over the declared model.
-    pub gain: f64,
-    /// What the number of fitted values and their pattern cost of it.
-    pub price: f64,
-}
-
-impl LogExplanation {
-    /// Gain less price.
-    pub fn score(&self) -> f64 {
-        self.gain - self.price
-    }
-}
-
-/// An effect that has no name, by what it acts on and depends on.
-#[derive(Debug, Clone, PartialEq)]
-pub struct UnlistedEffect {
-    /// Where in the loop it sits.
-    pub stage: Stage,
-    /// What it acts on.
-    pub acts_on: String,
-    /// What it depends on; `chance` where it is noise.
-    pub depends_on: String,
-    /// As a setting of [`sim::UNLISTED`], where it is no noise.
-    pub setting: Option<Setting>,
-    /// Log-likelihood gained over the declared model.
-    pub gain: f64,
-}
+use crate::{Answer, Candidate, Cause, Error, Explanation, Verdict};
 
 /// How white the filter's innovations of one measured number are.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -82,20 +36,12 @@ pub struct Channel {
 /// What robot logs say of the model.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LogDiagnosis {
-    /// The answer for all but the controller.
-    pub verdict: LogVerdict,
+    /// What is claimed.
+    pub answer: Answer,
     /// The controller.
     pub decide: Decided,
     /// Probability that as much is found in the logs of a robot that is as declared.
     pub p: f64,
-    /// What might explain the logs, the best score first.
-    pub explanations: Vec<LogExplanation>,
-    /// Share of the explained log-likelihood that further effects would add to the best explanation, and its p.
-    pub remainder_share: f64,
-    /// Probability of such a remainder by chance.
-    pub remainder_p: f64,
-    /// Set where no listed effect is the answer.
-    pub unlisted: Option<UnlistedEffect>,
     /// Camera x and y, then S0 to S7, under the best explanation.
     pub channels: [Channel; MEASURED],
     /// Where the walls seem to be cut.
@@ -155,6 +101,10 @@ pub fn diagnose_logs(model: &Model, scene: &Scene, runs: &[&[LogRow]]) -> Result
 
 /// A probability below which something is there: one false alarm in a hundred data sets.
 const ALARM: f64 = 0.01;
+/// A probability below which a remainder is significant.
+const SIGNIFICANT_P: f64 = 1e-3;
+/// Explanations within this log-likelihood of the best are alternatives.
+const ALTERNATIVE: f64 = 5.0;
 /// Share of the explained log-likelihood that a remainder may have at very high signal.
 const MATTERS: f64 = 0.02;
 
@@ -166,7 +116,7 @@ struct Search<'a> {
     found: Vec<Refined>,
     p: f64,
     remainder: (f64, f64),
-    unlisted: Option<UnlistedEffect>,
+    unlisted: Option<Unnamed>,
     channels: [Channel; MEASURED],
     step: Option<f64>,
     step_gain: f64,
@@ -414,7 +364,7 @@ impl<'a> Search<'a> {
     }
 
     /// The group of basis functions that explains most, if it explains more than the best listed effects.
-    fn characterise(&self, listed: f64) -> Option<UnlistedEffect> {
+    fn characterise(&self, listed: f64) -> Option<Unnamed> {
         let groups = unlisted_variants();
         let traces = self.evidence.traces(&[])?;
         let found = leads(&self.evidence, &groups, &normals(&traces, &groups).ok()?);
@@ -429,18 +379,14 @@ impl<'a> Search<'a> {
         if refined.gain < listed {
             return None;
         }
-        let word = |i: usize| UNLISTED.params[i].choices[variant.values[i] as usize].to_owned();
-        Some(UnlistedEffect {
-            stage: stage_of(&refined.settings[0]),
-            acts_on: word(0),
-            depends_on: word(1),
-            setting: Some(refined.settings[0].clone()),
-            gain: refined.gain,
+        Cause::of(&refined.settings[0]).map(|cause| Unnamed {
+            cause,
+            refined: Some(refined),
         })
     }
 
     /// Noise that no normal distribution has: innovations with heavy tails that are no edges of readings.
-    fn rough(&self) -> Option<UnlistedEffect> {
+    fn rough(&self) -> Option<Unnamed> {
         let heavy = |channel: &Channel| {
             let deviation = (24.0 / channel.count.max(1) as f64).sqrt();
             channel.kurtosis > 3.3 && channel.kurtosis - 3.0 > 10.0 * deviation
@@ -455,77 +401,164 @@ impl<'a> Search<'a> {
             (false, 1 | 2) => (Stage::Sense, "reading"),
             _ => (Stage::Act, "wheel speed"),
         };
-        let gain = self.found.first().map_or(0.0, |best| best.gain);
-        Some(UnlistedEffect {
-            stage,
-            acts_on: acts_on.into(),
-            depends_on: "chance".into(),
-            setting: None,
-            gain,
+        Some(Unnamed {
+            cause: Cause {
+                stage,
+                acts_on: acts_on.into(),
+                depends_on: "chance".into(),
+            },
+            refined: None,
         })
     }
 
     fn answer(self, decide: Decided, corners: Corners) -> LogDiagnosis {
-        let step = self.step.and_then(|counts| {
-            let spec = find("reading-step").ok()?;
-            let setting = Setting::constant(spec, [counts]);
-            Some(Candidate {
-                setting,
-                standard_errors: vec![2e-4 * counts],
-                gain: self.step_gain,
-                fitted: 1,
-            })
-        });
-        let mut explanations: Vec<LogExplanation> = (self.found.iter().take(12))
-            .map(|refined| explanation(refined, step.as_ref()))
+        let certain = self.certain(&decide);
+        let mut explanations: Vec<Explanation> = (self.found.iter().take(12))
+            .map(|refined| self.explanation(refined, &certain))
             .collect();
-        if let (true, Some(step)) = (explanations.is_empty(), step) {
-            explanations.push(LogExplanation {
-                gain: step.gain,
-                price: price(1, By::Constant),
-                effects: vec![step],
+        let unnamed = self.unlisted.as_ref().and_then(|u| u.refined.as_ref());
+        if let Some(refined) = unnamed {
+            explanations.insert(0, self.explanation(refined, &certain));
+        }
+        if explanations.is_empty() && !certain.is_empty() {
+            explanations.push(Explanation {
+                gain: certain[0].gain,
+                score: certain[0].gain,
+                effects: certain,
+                share: 1.0,
+                remainder_p: self.p,
+                remainder: None,
             });
         }
-        let matters = self.remainder.1 < 1e-3 && self.remainder.0 > MATTERS;
-        let verdict = match (&self.unlisted, explanations.is_empty(), matters) {
-            (Some(_), ..) => LogVerdict::Unlisted,
-            (None, true, _) => LogVerdict::Faithful,
-            (None, false, true) => LogVerdict::PartlyExplained,
-            (None, false, false) => LogVerdict::Explained,
+        let no_controller = matches!(decide, Decided::NoController { .. });
+        let matters = self.remainder.1 < SIGNIFICANT_P && self.remainder.0 > MATTERS;
+        let verdict = match &self.unlisted {
+            _ if no_controller => Verdict::Unexplained,
+            Some(Unnamed { refined: None, .. }) => Verdict::Unexplained,
+            Some(_) if matters => Verdict::PartlyExplained,
+            None if explanations.is_empty() => Verdict::Faithful,
+            None if matters => Verdict::PartlyExplained,
+            _ => Verdict::Explained,
         };
-        LogDiagnosis {
+        let cause = if no_controller {
+            Some(Cause {
+                stage: Stage::Decide,
+                acts_on: "command".into(),
+                depends_on: "reading".into(),
+            })
+        } else {
+            self.unlisted.as_ref().map(|unnamed| unnamed.cause.clone())
+        };
+        let indistinguishable = explanations.first().map_or(0, |best| {
+            (explanations.iter())
+                .take_while(|e| e.score > best.score - ALTERNATIVE && e.effects.len() == best.effects.len())
+                .count()
+        });
+        let runs = self.evidence.runs().last().map_or(0, |last| last + 1);
+        let mut answer = Answer {
             verdict,
+            explanations,
+            indistinguishable,
+            left_out: Vec::new(),
+            cause,
+        };
+        answer.left_out = (0..runs)
+            .map(|run| self.without(run, unnamed.or(self.found.first()), &answer))
+            .collect();
+        LogDiagnosis {
+            answer,
             decide,
             p: if self.step.is_some() { 0.0 } else { self.p },
-            explanations,
-            remainder_share: self.remainder.0,
-            remainder_p: self.remainder.1,
-            unlisted: self.unlisted,
             channels: self.channels,
             corners,
             steps: self.steps,
         }
     }
+
+    /// The effects that need no fit: the controller's, and the multiples that readings were rounded to.
+    fn certain(&self, decide: &Decided) -> Vec<Candidate> {
+        let mut certain = match decide {
+            Decided::Changed(effects) => effects.clone(),
+            _ => Vec::new(),
+        };
+        certain.extend(self.step.and_then(|counts| {
+            let spec = find("reading-step").ok()?;
+            Some(Candidate {
+                setting: Setting::constant(spec, [counts]),
+                standard_errors: vec![2e-4 * counts],
+                gain: self.step_gain,
+                fitted: 1,
+            })
+        }));
+        certain
+    }
+
+    fn explanation(&self, refined: &Refined, certain: &[Candidate]) -> Explanation {
+        let own = (refined.settings.iter())
+            .zip(&refined.standard_errors)
+            .map(|(setting, errors)| Candidate {
+                setting: setting.clone(),
+                standard_errors: errors.clone(),
+                gain: refined.gain,
+                fitted: errors.iter().filter(|error| **error > 0.0).count(),
+            });
+        Explanation {
+            effects: certain.iter().cloned().chain(own).collect(),
+            gain: refined.gain,
+            score: refined.score(),
+            share: refined.gain / (refined.gain + self.left_beside(refined)).max(1e-9),
+            remainder_p: self.remainder.1,
+            remainder: None,
+        }
+    }
+
+    /// Log-likelihood that further effects would gain beside the best explanation; other explanations lack what they gain
+    /// less than the best.
+    fn left_beside(&self, refined: &Refined) -> f64 {
+        let best = self.found.first().map_or(0.0, |best| best.gain);
+        let left = best * self.remainder.0 / (1.0 - self.remainder.0).max(1e-9);
+        left + (best - refined.gain).max(0.0)
+    }
+
+    /// The answer's effects with sizes fitted to all runs but one.
+    fn without(&self, run: usize, best: Option<&Refined>, answer: &Answer) -> Vec<Setting> {
+        let mut settings = answer.settings();
+        let Some(best) = best else { return settings };
+        let first = settings.len().saturating_sub(best.settings.len());
+        let refitted = best.refit(&self.evidence.without(run), &self.variants);
+        for (place, setting) in settings.iter_mut().skip(first).zip(refitted) {
+            *place = setting;
+        }
+        for setting in &mut settings {
+            if let Pattern::ByRun(values) = &mut setting.pattern {
+                *setting = Setting {
+                    spec: setting.spec,
+                    pattern: Pattern::ByRun(with_mean_of_others(values, run)),
+                };
+            }
+        }
+        settings
+    }
 }
 
-fn explanation(refined: &Refined, step: Option<&Candidate>) -> LogExplanation {
-    let own = refined
-        .settings
-        .iter()
-        .zip(&refined.standard_errors)
-        .map(|(setting, errors)| Candidate {
-            setting: setting.clone(),
-            standard_errors: errors.clone(),
-            gain: refined.gain,
-            fitted: errors.iter().filter(|error| **error > 0.0).count(),
-        });
-    let effects: Vec<Candidate> = step.cloned().into_iter().chain(own).collect();
-    let more = step.map_or(0.0, |step| step.gain);
-    LogExplanation {
-        effects,
-        gain: refined.gain + more,
-        price: price(refined.fitted, refined.by),
+/// The values of runs with those of one replaced by the mean of the others'.
+fn with_mean_of_others(values: &[Vec<f64>], run: usize) -> Vec<Vec<f64>> {
+    let mut replaced = values.to_vec();
+    let others = values.len() as f64 - 1.0;
+    if others > 0.0 && run < values.len() {
+        for i in 0..values[run].len() {
+            let sum: f64 = values.iter().map(|v| v[i]).sum();
+            replaced[run][i] = (sum - values[run][i]) / others;
+        }
     }
+    replaced
+}
+
+/// A cause without a name: its best coefficients, unless it is noise.
+#[derive(Debug)]
+struct Unnamed {
+    cause: Cause,
+    refined: Option<Refined>,
 }
 
 /// The best score.

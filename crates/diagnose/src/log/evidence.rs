@@ -121,14 +121,20 @@ impl<'a> Evidence<'a> {
 
     /// The part of the evidence that one run gives.
     pub(crate) fn of_run(&self, run: usize) -> Self {
-        let stretches = (self.stretches.iter().filter(|stretch| stretch.run == run))
-            .map(|stretch| Stretch {
-                run,
-                rows: stretch.rows,
-                used: stretch.used.clone(),
-            })
-            .collect();
-        Self { stretches, ..*self }
+        self.where_run(|other| other == run)
+    }
+
+    /// The evidence of all other runs.
+    pub(crate) fn without(&self, run: usize) -> Self {
+        self.where_run(|other| other != run)
+    }
+
+    fn where_run(&self, wanted: impl Fn(usize) -> bool) -> Self {
+        let stretches = self.stretches.iter().filter(|stretch| wanted(stretch.run));
+        Self {
+            stretches: stretches.cloned().collect(),
+            ..*self
+        }
     }
 
     /// The same evidence against a scene whose walls are cut otherwise.

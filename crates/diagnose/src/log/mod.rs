@@ -23,5 +23,5 @@ mod steps;
 
 pub use corners::Corners;
 pub use decide::Decided;
-pub use diagnosis::{Channel, LogDiagnosis, LogExplanation, LogVerdict, UnlistedEffect, diagnose_logs};
+pub use diagnosis::{Channel, LogDiagnosis, diagnose_logs};
 pub use rows::LogRow;

@@ -178,6 +178,24 @@ impl Refined {
         trusted(self.gain, self.by) - price(self.fitted, self.by)
     }
 
+    /// The settings fitted again to other evidence, from where they are; those that jump or go by run stay.
+    pub(crate) fn refit(&self, evidence: &Evidence<'_>, variants: &[Variant]) -> Vec<Setting> {
+        const STEPS: usize = 2;
+        let knobs: Vec<_> = (self.settings.iter().enumerate())
+            .filter(|(_, setting)| !jumps(setting) && !matches!(setting.pattern, Pattern::ByRun(_)))
+            .filter_map(|(i, setting)| {
+                let variant = variants.iter().find(|v| v.spec == setting.spec)?;
+                Some(knobs(variant, i, &setting.pattern))
+            })
+            .flatten()
+            .collect();
+        if knobs.is_empty() || evidence.stretches.is_empty() {
+            return self.settings.clone();
+        }
+        refine(evidence, self.settings.clone(), knobs, STEPS)
+            .map_or_else(|| self.settings.clone(), |fitted| fitted.settings)
+    }
+
     /// What was fitted beside another candidate, as one candidate of both.
     pub(crate) fn after(mut self, first: &Self) -> Self {
         let own = std::mem::replace(&mut self.standard_errors, first.standard_errors.clone());
