@@ -2,6 +2,7 @@
 
 mod answer;
 mod candidate;
+mod corners;
 mod error;
 mod laps;
 mod least_squares;
@@ -10,7 +11,8 @@ mod response_fit;
 
 pub use answer::{Answer, Cause, Explanation, Verdict};
 pub use candidate::Candidate;
+pub use corners::{Corners, other_cuts};
 pub use error::Error;
 pub use laps::{Atlas, FourNumbers, LapDiagnosis, Quadratic, Simulate};
-pub use log::{Channel, Corners, Decided, LogDiagnosis, LogRow, diagnose_logs};
+pub use log::{Channel, Decided, LogDiagnosis, LogRow, diagnose_logs};
 pub use response_fit::{Estimate, ResponseFit};

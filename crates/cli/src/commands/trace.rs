@@ -1,6 +1,6 @@
 //! `lapwing trace`: what the model lacks.
 
-use anyhow::{Result, bail};
+use anyhow::Result;
 use serde_json::json;
 
 use crate::args;
@@ -14,16 +14,12 @@ use crate::trace::{Cache, Trace, document, sections, summary};
 
 pub(crate) fn run(session: &Session, args: &args::Trace) -> Result<()> {
     let file = setup::model_file(&args.model)?;
-    let [measured] = args.measured.as_slice() else {
-        bail!(
-            "one --measured data set at a time can be traced; {} given",
-            args.measured.len()
-        );
-    };
-    let set = DataSet::load(measured)?;
+    let sets: Vec<DataSet> = (args.measured.iter())
+        .map(|path| DataSet::load(path))
+        .collect::<Result<_>>()?;
     let held_out = args.held_out.as_deref().map(DataSet::load).transpose()?;
     let mut inputs = vec![file.input.clone()];
-    inputs.extend(set.inputs.clone());
+    inputs.extend(sets.iter().flat_map(|set| set.inputs.clone()));
     inputs.extend(held_out.iter().flat_map(|set| set.inputs.clone()));
     let configuration = json!({
         "model": file.config, "seed": session.seed(), "measured": args.measured, "held_out": args.held_out, "inputs": inputs,
@@ -31,7 +27,7 @@ pub(crate) fn run(session: &Session, args: &args::Trace) -> Result<()> {
     let folder = OutDir::create(&args.out, &Work::new("trace", &configuration), false)?;
     let cache = Cache::new(args.cache.as_deref(), !args.no_cache);
     let world = args.model.settings.world.as_deref();
-    let trace = Trace::new(session, &file, world, set, held_out, &cache)?;
+    let trace = Trace::new(session, &file, world, sets, held_out, &cache)?;
     let document = document(&trace);
     let sections = sections(&trace)?;
     folder.write("trace.json", format!("{document:#}\n"))?;
@@ -40,7 +36,10 @@ pub(crate) fn run(session: &Session, args: &args::Trace) -> Result<()> {
         folder.write(&format!("figures/{}.svg", picture.file), picture.figure.to_svg()?)?;
     }
     let text = summary(&trace);
-    let title = format!("What the model lacks: {}", trace.measured.set.name);
+    let names: Vec<&str> = (trace.recordings.iter())
+        .map(|recording| recording.measured.set.name.as_str())
+        .collect();
+    let title = format!("What the model lacks: {}", names.join(", "));
     let tables: String = sections
         .iter()
         .flat_map(Section::tables)

@@ -23,11 +23,13 @@ pub(crate) fn document(trace: &Trace) -> Value {
         "alternative_sets": if sets.len() > 1 { sets } else { Vec::new() },
         "error": {
             "metric": "rms over the gates of the difference between the mean lateral position of simulated laps and of a held-out run, m",
-            "before": trace.before_m, "after": trace.after_m, "floor": trace.floor_m,
-            "held_out": trace.held_out.iter().map(|run| run.name.clone()).collect::<Vec<_>>(),
+            "before": trace.mean_m(|e| &e.before_m), "after": trace.mean_m(|e| &e.after_m),
+            "floor": trace.mean_m(|e| &e.floor_m),
+            "held_out": trace.held_out().map(|run| run.name.clone()).collect::<Vec<_>>(),
         },
         "candidates": answer.explanations.iter().map(candidate).collect::<Vec<_>>(),
         "separate_with": Vec::<Value>::new(),
+        "remarks": trace.remarks,
         "laps_simulated": trace.laps_simulated,
     });
     if let Some(found) = &trace.from_logs {

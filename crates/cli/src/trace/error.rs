@@ -2,98 +2,101 @@
 
 use anyhow::{Context, Result};
 use rayon::prelude::*;
-use sim::{Setting, Streams};
+use sim::{Pattern, Setting, Streams};
 
 use crate::laps::SampledRun;
 use crate::setup::Setup;
 
-/// Data sets of four runs behind every mean lap: 16 x 4 x 20 laps.
-const SETS: u64 = 16;
-const RUNS: u64 = 4;
+/// Runs behind every mean lap, each of at least 20 laps.
+const RUNS: u64 = 64;
+/// Runs that share a seed.
+const RUNS_PER_SEED: u64 = 4;
 /// Seeds of the laps that errors are measured with lie far from those of the fit.
 const SEED_OFFSET: u64 = 1 << 40;
 
-/// Mean laps of simulated runs, m.
+/// Laps simulated for a mean lap, with that mean.
 #[derive(Debug, Clone)]
 pub(crate) struct MeanLaps {
-    /// Over all runs: one position for each gate.
+    /// Over all runs: one position for each gate, m.
     pub(crate) mean_m: Vec<f64>,
-    /// Of each run.
-    runs_m: Vec<Vec<f64>>,
+    /// Runs x laps x gates, m.
+    runs_m: Vec<Vec<Vec<f64>>>,
     /// Mean lap time, s.
     pub(crate) lap_s: f64,
-    /// Every simulated lap, laps x gates, m.
-    pub(crate) laps_m: Vec<Vec<f64>>,
 }
 
 impl MeanLaps {
-    /// Simulates a model with effects: 16 x 4 runs of `laps` laps. By run, the runs take the effects' values in turn.
+    /// Simulates a model with effects: 64 runs of `laps` laps. By run, the runs take the effects' values in turn.
     pub(crate) fn new(setup: &Setup, effects: &[Setting], seed: u64, laps: usize) -> Result<Self> {
         let mut model = setup.model.clone();
         model.effects.extend_from_slice(effects);
-        let variant = Setup {
-            model,
-            scene: setup.scene.clone(),
-        };
-        let drives: Vec<sim::Drive> = (0..SETS * RUNS)
+        let variants = effects.iter().filter_map(|effect| match &effect.pattern {
+            Pattern::ByRun(runs) => Some(runs.len()),
+            _ => None,
+        });
+        let different = variants.min().unwrap_or(1);
+        let drives: Vec<sim::Drive> = (0..RUNS)
             .into_par_iter()
             .map(|i| {
                 let streams = Streams {
-                    seed: seed + SEED_OFFSET + i / RUNS,
-                    run: i % RUNS,
+                    seed: seed + SEED_OFFSET + i / RUNS_PER_SEED,
+                    run: i % RUNS_PER_SEED,
                 };
-                variant.drive(streams, laps, |_| {})
+                let world = setup.scene.world(&model, i as usize % different)?;
+                sim::drive(&world, streams, laps, |_| {})
             })
             .collect::<Result<_, _>>()?;
         let closed = |drive: &sim::Drive| -> Vec<Vec<f64>> {
-            drive
-                .laps
-                .iter()
+            (drive.laps.iter())
                 .filter(|lap| lap.missed.is_empty())
                 .map(|lap| lap.offsets_m.clone())
                 .collect()
         };
-        let runs: Vec<Vec<Vec<f64>>> = drives
-            .iter()
-            .map(closed)
+        let runs_m: Vec<Vec<Vec<f64>>> = (drives.iter().map(closed))
             .filter(|laps| !laps.is_empty())
             .collect();
-        let laps_m: Vec<Vec<f64>> = runs.iter().flatten().cloned().collect();
-        let mean_m = mean(&laps_m).context("the simulated robot completes no lap")?;
-        let times: Vec<f64> = drives
-            .iter()
-            .flat_map(|d| &d.laps)
+        let mean_m = mean(runs_m.iter().flatten()).context("the simulated robot completes no lap")?;
+        let times: Vec<f64> = (drives.iter().flat_map(|d| &d.laps))
             .map(track::Lap::duration_s)
             .filter(|t| t.is_finite())
             .collect();
         let lap_s = times.iter().sum::<f64>() / times.len() as f64;
         Ok(Self {
             mean_m,
-            runs_m: runs.iter().filter_map(|laps| mean(laps)).collect(),
+            runs_m,
             lap_s,
-            laps_m,
         })
+    }
+
+    /// Every simulated lap, gate by gate, m.
+    pub(crate) fn laps_m(&self) -> impl Iterator<Item = &Vec<f64>> {
+        self.runs_m.iter().flatten()
     }
 
     /// The root mean square over the gates of the difference to a measured run's mean lap, m.
     pub(crate) fn distance_m(&self, run: &SampledRun) -> f64 {
-        mean(&run.offsets_m()).map_or(f64::NAN, |mean_m| rms(&self.mean_m, &mean_m))
+        mean(run.offsets_m().iter()).map_or(f64::NAN, |mean_m| rms(&self.mean_m, &mean_m))
     }
 
-    /// What [`MeanLaps::distance_m`] is on average for a run that this very model drove, m.
-    pub(crate) fn floor_m(&self) -> f64 {
-        self.runs_m.iter().map(|run| rms(&self.mean_m, run)).sum::<f64>() / self.runs_m.len() as f64
+    /// What [`MeanLaps::distance_m`] is on average for a run of so many laps that this very model drove, m.
+    pub(crate) fn floor_m(&self, laps: usize) -> f64 {
+        let distances: Vec<f64> = (self.runs_m.iter())
+            .filter_map(|run| mean(run.iter().take(laps)))
+            .map(|run| rms(&self.mean_m, &run))
+            .collect();
+        distances.iter().sum::<f64>() / distances.len() as f64
     }
 }
 
-/// The mean of laps, gate by gate.
-pub(crate) fn mean(laps: &[Vec<f64>]) -> Option<Vec<f64>> {
-    let gates = laps.first()?.len();
-    Some(
-        (0..gates)
-            .map(|g| laps.iter().map(|lap| lap[g]).sum::<f64>() / laps.len() as f64)
-            .collect(),
-    )
+/// The mean of laps, gate by gate; `None` of none.
+pub(crate) fn mean<'a>(laps: impl Iterator<Item = &'a Vec<f64>>) -> Option<Vec<f64>> {
+    let (mut sum, mut count) = (Vec::new(), 0.0);
+    for lap in laps {
+        sum.resize(lap.len(), 0.0);
+        sum.iter_mut().zip(lap).for_each(|(s, x)| *s += x);
+        count += 1.0;
+    }
+    (count > 0.0).then(|| sum.into_iter().map(|s: f64| s / count).collect())
 }
 
 fn rms(a: &[f64], b: &[f64]) -> f64 {

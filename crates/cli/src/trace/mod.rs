@@ -5,51 +5,64 @@ mod cache;
 mod document;
 mod error;
 mod pages;
+mod recording;
 
 use std::path::Path;
 
-use anyhow::{Context, Result, ensure};
-use diagnose::{Answer, Atlas, FourNumbers};
-use sim::{Setting, Streams};
+use anyhow::{Result, ensure};
+use diagnose::{Answer, Atlas, FourNumbers, Simulate};
+use sim::{Pattern, Setting};
 
 use answer::{FromLogs, from_logs, log_rows};
 pub(crate) use cache::Cache;
 pub(crate) use document::document;
 pub(crate) use error::{MeanLaps, mean};
 pub(crate) use pages::{sections, summary};
+use recording::{Recording, Seeds, held_out, simulate_all};
 
 use crate::config::{Config, ModelFile};
 use crate::dataset::DataSet;
 use crate::interrupt;
-use crate::laps::{Measured, SampledRun};
+use crate::laps::SampledRun;
 use crate::session::Session;
-use crate::setup::{self, Setup};
+use crate::setup;
+
+/// Laps behind every mean lap are at least so many a run.
+const LAPS: usize = 20;
 
 /// A diagnosis with what a reader wants to know of it.
 #[derive(Debug)]
 pub(crate) struct Trace {
-    pub(crate) config: Config,
-    pub(crate) setup: Setup,
-    pub(crate) measured: Measured,
+    /// The measured data sets, each on the model that it declares.
+    pub(crate) recordings: Vec<Recording>,
     /// How the laps depart from the declared model.
     pub(crate) residual: FourNumbers,
     /// What is claimed.
     pub(crate) answer: Answer,
     /// What the robot's logs say, where there are logs.
     pub(crate) from_logs: Option<FromLogs>,
-    /// The runs that errors are measured on.
-    pub(crate) held_out: Vec<SampledRun>,
-    pub(crate) before: MeanLaps,
-    pub(crate) after: MeanLaps,
-    /// Root mean square distances, m: mean over the held-out runs.
-    pub(crate) before_m: f64,
-    pub(crate) after_m: f64,
-    pub(crate) floor_m: f64,
+    /// The error, recording by recording.
+    pub(crate) errors: Vec<Errors>,
+    /// What a reader must know of the data.
+    pub(crate) remarks: Vec<String>,
     pub(crate) laps_simulated: u64,
 }
 
+/// How far one recording's held-out runs are from the simulation.
+#[derive(Debug)]
+pub(crate) struct Errors {
+    pub(crate) held_out: Vec<SampledRun>,
+    pub(crate) before: MeanLaps,
+    pub(crate) after: MeanLaps,
+    /// For each held-out run: root mean square distances, m.
+    pub(crate) before_m: Vec<f64>,
+    pub(crate) after_m: Vec<f64>,
+    /// What it is for runs of the model with the effects, m.
+    pub(crate) floor_m: Vec<f64>,
+}
+
 impl Trace {
-    /// Traces what a model lacks in a measured data set.
+    /// Traces what a model lacks in measured data sets.
     ///
     /// # Errors
     /// Data of another world or controller, too few laps, a model that cannot drive.
@@ -57,168 +70,228 @@ impl Trace {
         session: &Session,
         file: &ModelFile,
         world: Option<&Path>,
-        set: DataSet,
-        held_out: Option<DataSet>,
+        sets: Vec<DataSet>,
+        unseen: Option<DataSet>,
         cache: &Cache,
     ) -> Result<Self> {
-        let config = set.declared_config(&file.config)?;
-        let source = file.world(world)?;
-        let circuit = setup::circuit(&source, config.run.gates)?;
-        let check = |set: &DataSet| belongs(set, &config, &source.text);
-        check(&set)?;
-        let measured = Measured::on(set, circuit.clone())?;
-        let held_out = held_out
-            .map(|set| {
-                check(&set)?;
-                anyhow::Ok(Measured::on(set, circuit.clone())?.runs)
+        let recordings: Vec<Recording> = sets
+            .into_iter()
+            .map(|set| Recording::new(session, file, world, set))
+            .collect::<Result<_>>()?;
+        let unseen = unseen.map(|set| held_out(&recordings, file, set)).transpose()?;
+        let seed = session.seed();
+        let simulate = |effects: &[Setting], set: u64| {
+            simulate_all(&recordings, effects, Seeds { session: seed, set })
+        };
+        let laps: Vec<Vec<track::Lap>> = recordings.iter().flat_map(Recording::laps).collect();
+        let few = laps.iter().position(|run| run.len() < 3);
+        ensure!(
+            few.is_none(),
+            "run {} has {} whole laps after its first: at least 3 in every run are needed to trace anything",
+            runs(&recordings).nth(few.unwrap_or(0)).map_or("", |run| run.name.as_str()),
+            laps[few.unwrap_or(0)].len()
+        );
+        let logged = with_logs(&recordings);
+        let parts = (recordings.iter())
+            .map(|recording| match logged {
+                Some(_) => judging_atlas(session, recording),
+                None => atlas(session, recording, cache),
             })
-            .transpose()?;
-        measured
-            .runs
-            .iter()
-            .flat_map(SampledRun::remarks)
-            .for_each(|remark| session.remark(&remark));
-        let setup = Setup::new(&config, circuit, None)?;
-        let shape: Vec<usize> = measured.runs.iter().map(|run| run.laps.len()).collect();
-        let simulate = |effects: &[Setting], set: u64| data_set(&setup, effects, session.seed(), set, &shape);
-        let laps: Vec<Vec<track::Lap>> = measured.runs.iter().map(|run| run.laps.clone()).collect();
-        let (residual, answer, from_logs) = match log_rows(&measured.set) {
-            Some(rows) => {
-                let progress = session.progress("judging the laps and following the logs", Atlas::null_sets());
-                let atlas = Atlas::without_effects(&simulate, &|| progress.tick(1))?;
-                let found = from_logs(&setup, &rows, &atlas, &simulate, &laps)?;
+            .collect::<Result<Vec<_>>>()?;
+        let atlas = Atlas::join(parts).expect("at least one data set is measured");
+        let progress = session.progress("naming the effect", 1);
+        let (residual, answer, from_logs) = match logged {
+            Some((recording, rows)) => {
+                let found = from_logs(&recording.setup, &rows, &atlas, &simulate, &laps);
+                interrupt::check()?;
+                let found = found?;
                 (found.before, found.answer(), Some(found))
             }
             None => {
-                let atlas = atlas(session, &config, &source.text, &shape, cache, &simulate)?;
+                let found = atlas.diagnose(&simulate, &laps);
                 interrupt::check()?;
-                let progress = session.progress("naming the effect", 1);
-                let found = atlas.diagnose(&simulate, &laps)?;
-                progress.tick(1);
+                let found = found?;
                 (found.residual, found.answer, None)
             }
         };
+        progress.tick(1);
+        drop(progress);
+        let errors = errors(&recordings, &answer, unseen, seed)?;
         interrupt::check()?;
-
-        let wanted = shape.iter().copied().max().unwrap_or(20).max(20);
-        let before = MeanLaps::new(&setup, &[], session.seed(), wanted)?;
-        let settings = answer.settings();
-        let after = MeanLaps::new(&setup, &settings, session.seed(), wanted)?;
-        let mean_over = |values: Vec<f64>| values.iter().sum::<f64>() / values.len() as f64;
-        let (held_out, after_m) = match held_out {
-            Some(runs) => {
-                let distances = runs.iter().map(|run| after.distance_m(run)).collect();
-                (runs, mean_over(distances))
-            }
-            None => {
-                let without = measured
-                    .runs
-                    .iter()
-                    .zip(&answer.left_out)
-                    .map(|(run, effects)| {
-                        Ok(MeanLaps::new(&setup, effects, session.seed(), wanted)?.distance_m(run))
-                    });
-                let distances = without.collect::<Result<_>>()?;
-                (measured.runs.clone(), mean_over(distances))
-            }
-        };
-        let before_m = mean_over(held_out.iter().map(|run| before.distance_m(run)).collect());
-        let floor_m = after.floor_m();
-        let laps_simulated = Atlas::sets() * shape.iter().sum::<usize>() as u64;
         Ok(Self {
-            config,
-            setup,
-            measured,
+            remarks: remarks(&recordings),
+            laps_simulated: laps_simulated(&recordings, &atlas, from_logs.is_some()),
+            recordings,
             residual,
             answer,
             from_logs,
-            held_out,
-            before,
-            after,
-            before_m,
-            after_m,
-            floor_m,
-            laps_simulated,
+            errors,
         })
     }
 
     /// The declared model with the effects of the answer.
     pub(crate) fn after_config(&self) -> Config {
-        let mut config = self.config.clone();
+        let mut config = self.recordings[0].config.clone();
         config
             .effect
             .extend(self.answer.settings().iter().map(setup::effect_table));
         config
     }
+
+    /// Mean over all held-out runs of one of the errors, m.
+    pub(crate) fn mean_m(&self, which: impl Fn(&Errors) -> &[f64]) -> f64 {
+        let all: Vec<f64> = (self.errors.iter())
+            .flat_map(|errors| which(errors).iter().copied())
+            .collect();
+        all.iter().sum::<f64>() / all.len() as f64
+    }
+
+    /// All held-out runs.
+    pub(crate) fn held_out(&self) -> impl Iterator<Item = &SampledRun> {
+        self.errors.iter().flat_map(|errors| &errors.held_out)
+    }
 }
 
-/// Refuses data that are not the model's.
-fn belongs(set: &DataSet, config: &Config, world: &str) -> Result<()> {
-    let shown = set.folder.display();
-    if let Some(controller) = set.controller {
-        ensure!(
-            controller == config.controller.kind,
-            "{shown}: driven by the {} controller, and the model's is {}; add --set controller.kind={}",
-            controller.name(),
-            config.controller.kind.name(),
-            controller.name()
+fn runs(recordings: &[Recording]) -> impl Iterator<Item = &SampledRun> {
+    recordings.iter().flat_map(|recording| &recording.measured.runs)
+}
+
+/// What these data do not allow.
+fn remarks(recordings: &[Recording]) -> Vec<String> {
+    let mut remarks = Vec::new();
+    if runs(recordings).count() == 1 {
+        remarks.push(
+            "One run only: whether the robot differs from run to run cannot be told, and the error after is that of \
+             the very run that was fitted; measure a second run, or give one with --held-out."
+                .to_owned(),
         );
     }
-    let source = set
-        .world_source(None)
-        .with_context(|| format!("{shown}: whose world must be the model's"))?;
-    ensure!(
-        source.text == world,
-        "{shown}: driven in another world ({}) than the model's",
-        source.label
-    );
-    Ok(())
+    for run in runs(recordings).filter(|run| run.laps.len() < run.wanted) {
+        remarks.push(format!("Run {} has {} of {} laps.", run.name, run.laps.len(), run.wanted));
+    }
+    remarks
 }
 
-/// One simulated data set of the measured one's shape; `None` where a run does not complete its laps.
-fn data_set(
-    setup: &Setup,
-    effects: &[Setting],
+/// The first recording with logs.
+fn with_logs(recordings: &[Recording]) -> Option<(&Recording, Vec<Vec<diagnose::LogRow>>)> {
+    recordings
+        .iter()
+        .find_map(|recording| log_rows(&recording.measured.set).map(|rows| (recording, rows)))
+}
+
+/// The errors of every recording; without unseen data each run is left out of the fit in turn.
+fn errors(
+    recordings: &[Recording],
+    answer: &Answer,
+    unseen: Option<(usize, Vec<SampledRun>)>,
     seed: u64,
-    set: u64,
-    shape: &[usize],
-) -> Option<Vec<Vec<track::Lap>>> {
-    let mut model = setup.model.clone();
-    model.effects.extend_from_slice(effects);
-    let run = |(run, &laps): (usize, &usize)| {
-        let world = setup.scene.world(&model, run).ok()?;
-        // Data sets have seeds of their own, far from those that a user's `drive` has.
-        let streams = Streams {
-            seed: (seed << 20) + (1 << 50) + set,
-            run: run as u64,
+) -> Result<Vec<Errors>> {
+    let mut all = Vec::new();
+    let mut first_run = 0;
+    for (place, recording) in recordings.iter().enumerate() {
+        let count = recording.measured.runs.len();
+        let own = first_run..first_run + count;
+        first_run += count;
+        let wanted = recording.shape().into_iter().fold(LAPS, usize::max);
+        let laps_of = |effects: &[Setting]| MeanLaps::new(&recording.setup, effects, seed, wanted);
+        let before = laps_of(&[])?;
+        let settings: Vec<Setting> = answer.settings().iter().map(|s| slice(s, own.clone())).collect();
+        let after = laps_of(&settings)?;
+        let (held_out, after_m) = match &unseen {
+            Some((at, _)) if *at != place => continue,
+            Some((_, runs)) => (runs.clone(), runs.iter().map(|run| after.distance_m(run)).collect()),
+            None => {
+                let runs = recording.measured.runs.clone();
+                let distance = |(run, at): (&SampledRun, usize)| {
+                    let without: Vec<Setting> = answer.left_out[at].iter().map(|s| slice(s, at..at + 1)).collect();
+                    if without.is_empty() {
+                        return Ok(before.distance_m(run));
+                    }
+                    Ok(laps_of(&without)?.distance_m(run))
+                };
+                let distances = runs.iter().zip(own).map(distance).collect::<Result<Vec<f64>>>()?;
+                (runs, distances)
+            }
         };
-        let drive = sim::drive(&world, streams, laps, |_| {}).ok()?;
-        let closed: Vec<track::Lap> = drive
-            .laps
-            .into_iter()
-            .filter(|lap| lap.missed.is_empty())
-            .collect();
-        (closed.len() == laps).then_some(closed)
-    };
-    shape.iter().enumerate().map(run).collect()
+        all.push(Errors {
+            before_m: held_out.iter().map(|run| before.distance_m(run)).collect(),
+            floor_m: held_out.iter().map(|run| after.floor_m(run.laps.len())).collect(),
+            held_out,
+            before,
+            after,
+            after_m,
+        });
+    }
+    Ok(all)
 }
 
-/// The model's atlas, from the cache or made now.
-fn atlas(
-    session: &Session,
-    config: &Config,
-    world: &str,
-    shape: &[usize],
-    cache: &Cache,
-    simulate: &diagnose::Simulate<'_>,
-) -> Result<Atlas> {
+/// A setting for some of the runs.
+fn slice(setting: &Setting, runs: std::ops::Range<usize>) -> Setting {
+    let pattern = match &setting.pattern {
+        Pattern::ByRun(values) => Pattern::ByRun(values[runs].to_vec()),
+        other => other.clone(),
+    };
+    Setting {
+        spec: setting.spec,
+        pattern,
+    }
+}
+
+/// What the declared model and its other cuts simulate for one recording.
+fn with_simulations<R>(
+    recording: &Recording,
+    seed: u64,
+    use_them: impl FnOnce(&Simulate<'_>, &[&Simulate<'_>]) -> R,
+) -> R {
+    let of = |setup| {
+        move |effects: &[Setting], set: u64| recording.simulate(setup, effects, Seeds { session: seed, set }, 0)
+    };
+    let declared = of(&recording.setup);
+    let cuts: Vec<_> = recording.cuts.iter().map(of).collect();
+    let cuts: Vec<&Simulate<'_>> = cuts.iter().map(|cut| cut as &Simulate<'_>).collect();
+    use_them(&declared, &cuts)
+}
+
+/// What the declared model leads one to expect of a recording: enough to judge laps by.
+fn judging_atlas(session: &Session, recording: &Recording) -> Result<Atlas> {
+    let sets = Atlas::null_sets(recording.cuts.len());
+    let progress = session.progress("simulating the declared model", sets);
+    let atlas = with_simulations(recording, session.seed(), |declared, cuts| {
+        Atlas::without_effects(declared, cuts, &|| progress.tick(1))
+    });
+    interrupt::check()?;
+    Ok(atlas?)
+}
+
+/// Laps simulated for a diagnosis; those of a cached atlas count as if they were simulated now.
+fn laps_simulated(recordings: &[Recording], atlas: &Atlas, judged_only: bool) -> u64 {
+    let of = |recording: &Recording| {
+        let cuts = recording.cuts.len();
+        let sets = if judged_only {
+            Atlas::null_sets(cuts)
+        } else {
+            Atlas::sets(cuts)
+        };
+        (sets + atlas.spent()) * recording.shape().iter().sum::<usize>() as u64
+    };
+    recordings.iter().map(of).sum()
+}
+
+/// A recording's atlas, from the cache or made now.
+fn atlas(session: &Session, recording: &Recording, cache: &Cache) -> Result<Atlas> {
+    let Recording { config, world, .. } = recording;
+    let shape = recording.shape();
     let key = format!("{}\n{world}\n{shape:?}\n{}", config.to_toml(), session.seed());
     if let Some(atlas) = cache.get(&key) {
         return Ok(atlas);
     }
-    let progress = session.progress("simulating what each effect would do", Atlas::sets());
-    let atlas = Atlas::new(simulate, &|| progress.tick(1))?;
+    let progress = session.progress("simulating what each effect would do", Atlas::sets(recording.cuts.len()));
+    let atlas = with_simulations(recording, session.seed(), |declared, cuts| {
+        Atlas::new(declared, cuts, &|| progress.tick(1))
+    });
     drop(progress);
+    interrupt::check()?;
+    let atlas = atlas?;
     cache.put(&key, &atlas);
     Ok(atlas)
 }

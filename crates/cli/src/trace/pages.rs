@@ -74,9 +74,9 @@ pub(crate) fn summary(trace: &Trace) -> String {
     };
     format!(
         "{said}{alternatives}\nError of the mean lap on held-out runs: {:.2} mm before, {:.2} mm after; {:.2} mm would be chance.",
-        MM * trace.before_m,
-        MM * trace.after_m,
-        MM * trace.floor_m
+        MM * trace.mean_m(|e| &e.before_m),
+        MM * trace.mean_m(|e| &e.after_m),
+        MM * trace.mean_m(|e| &e.floor_m)
     )
 }
 
@@ -125,31 +125,38 @@ fn error_table(trace: &Trace) -> Table {
         &["", "before", "after", "chance"],
     );
     let mm = |m: f64| format!("{:.2}", MM * m);
-    table.push([
-        "mean lap, rms over the gates, mm".to_owned(),
-        mm(trace.before_m),
-        mm(trace.after_m),
-        mm(trace.floor_m),
-    ]);
-    let times: Vec<f64> = trace.held_out.iter().flat_map(SampledRun::lap_times_s).collect();
-    let measured_s = times.iter().sum::<f64>() / times.len() as f64;
-    let off = |laps: &MeanLaps| format!("{:+.2}", laps.lap_s - measured_s);
-    table.push([
-        "lap time, s off".to_owned(),
-        off(&trace.before),
-        off(&trace.after),
-        "0".into(),
-    ]);
-    for modes in [2, 10] {
-        let distance = |laps: &MeanLaps| {
-            distance(laps, &trace.held_out, modes).map_or("-".into(), |d| format!("{d:.2}"))
+    for (errors, recording) in trace.errors.iter().zip(&trace.recordings) {
+        let of = match trace.errors.len() {
+            1 => String::new(),
+            _ => format!("{}: ", recording.measured.set.name),
         };
+        let mean_mm = |values: &[f64]| mm(values.iter().sum::<f64>() / values.len() as f64);
         table.push([
-            format!("eq. 8 in {modes} modes"),
-            distance(&trace.before),
-            distance(&trace.after),
-            "-".into(),
+            format!("{of}mean lap, rms over the gates, mm"),
+            mean_mm(&errors.before_m),
+            mean_mm(&errors.after_m),
+            mean_mm(&errors.floor_m),
         ]);
+        let times: Vec<f64> = errors.held_out.iter().flat_map(SampledRun::lap_times_s).collect();
+        let measured_s = times.iter().sum::<f64>() / times.len() as f64;
+        let off = |laps: &MeanLaps| format!("{:+.2}", laps.lap_s - measured_s);
+        table.push([
+            format!("{of}lap time, s off"),
+            off(&errors.before),
+            off(&errors.after),
+            "0".into(),
+        ]);
+        for modes in [2, 10] {
+            let distance = |laps: &MeanLaps| {
+                distance(laps, &errors.held_out, modes).map_or("-".into(), |d| format!("{d:.2}"))
+            };
+            table.push([
+                format!("{of}eq. 8 in {modes} modes"),
+                distance(&errors.before),
+                distance(&errors.after),
+                "-".into(),
+            ]);
+        }
     }
     table
 }
@@ -157,8 +164,8 @@ fn error_table(trace: &Trace) -> Table {
 /// Eq. 8 between simulated laps and all held-out laps, in the modes of a PDM of both.
 fn distance(laps: &MeanLaps, runs: &[SampledRun], modes: usize) -> Option<f64> {
     let measured: Vec<Vec<f64>> = runs.iter().flat_map(SampledRun::offsets_m).collect();
-    let simulated =
-        pdm::Cluster::new("simulated", &laps.laps_m[..measured.len().min(laps.laps_m.len())]).ok()?;
+    let simulated: Vec<Vec<f64>> = laps.laps_m().take(measured.len()).cloned().collect();
+    let simulated = pdm::Cluster::new("simulated", &simulated).ok()?;
     let measured = pdm::Cluster::new("measured", &measured).ok()?;
     let model = pdm::Pdm::fit([&simulated, &measured]).ok()?;
     let project = |cluster| model.project(cluster, pdm::Modes::First(modes)).ok();
@@ -202,22 +209,22 @@ fn residual(trace: &Trace) -> Vec<Block> {
 }
 
 fn mean_measured(trace: &Trace) -> Vec<f64> {
-    let laps: Vec<Vec<f64>> = trace
+    let laps: Vec<Vec<f64>> = trace.recordings[0]
         .measured
         .runs
         .iter()
         .flat_map(SampledRun::offsets_m)
         .collect();
-    mean(&laps).unwrap_or_default()
+    mean(laps.iter()).unwrap_or_default()
 }
 
 fn residual_map(trace: &Trace) -> Figure {
-    let circuit = trace.setup.scene.circuit();
+    let circuit = trace.recordings[0].setup.scene.circuit();
     let measured = mean_measured(trace);
     let mut points = crossings(circuit, &measured);
     let mut values: Vec<f64> = measured
         .iter()
-        .zip(&trace.before.mean_m)
+        .zip(&trace.errors[0].before.mean_m)
         .map(|(m, s)| MM * (m - s))
         .collect();
     points.push(points[0]);
@@ -294,12 +301,12 @@ fn before_and_after(trace: &Trace) -> Vec<Block> {
         ),
         (
             "declared model".to_owned(),
-            trace.before.mean_m.clone(),
+            trace.errors[0].before.mean_m.clone(),
             line(Color::VERMILLION, Dash::Dashed, 1.6),
         ),
         (
             "with the answer".to_owned(),
-            trace.after.mean_m.clone(),
+            trace.errors[0].after.mean_m.clone(),
             line(Color::BLUE, Dash::Solid, 1.6),
         ),
     ];
@@ -308,14 +315,14 @@ fn before_and_after(trace: &Trace) -> Vec<Block> {
         "Mean position at each gate: measured, declared model, with the answer.",
         across(&curves),
     );
-    let circuit = trace.setup.scene.circuit();
+    let circuit = trace.recordings[0].setup.scene.circuit();
     let mut marks = vec![walls(&circuit.course)];
     let closed = |offsets: &[f64]| {
         let mut points = crossings(circuit, offsets);
         points.extend([points[0], chart::GAP]);
         points
     };
-    let measured_laps: Vec<[f64; 2]> = trace
+    let measured_laps: Vec<[f64; 2]> = trace.recordings[0]
         .measured
         .runs
         .iter()
@@ -323,8 +330,7 @@ fn before_and_after(trace: &Trace) -> Vec<Block> {
         .flat_map(|lap: &Lap| closed(&lap.offsets_m))
         .collect();
     let few = |laps: &MeanLaps| {
-        laps.laps_m
-            .iter()
+        laps.laps_m()
             .step_by(64)
             .take(10)
             .flat_map(|lap| closed(lap))
@@ -343,12 +349,12 @@ fn before_and_after(trace: &Trace) -> Vec<Block> {
     marks.push(Mark::new(
         "declared model",
         style(Color::VERMILLION),
-        Shape::Line(few(&trace.before)),
+        Shape::Line(few(&trace.errors[0].before)),
     ));
     marks.push(Mark::new(
         "with the answer",
         style(Color::BLUE),
-        Shape::Line(few(&trace.after)),
+        Shape::Line(few(&trace.errors[0].after)),
     ));
     let laps = single(
         "Laps before and after",

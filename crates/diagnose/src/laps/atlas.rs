@@ -1,11 +1,14 @@
 //! What the declared model leads one to expect, and how every probe changes it.
 
+use std::sync::atomic::{AtomicU64, Ordering};
+
 use nalgebra::DVector;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use sim::Setting;
 
 use super::expectation::{Expectation, Scatter};
+use super::layout::Layout;
 use super::probe::{Probe, probes};
 use super::summary::{BLOCKS, Summary};
 use crate::Error;
@@ -21,44 +24,74 @@ pub(super) const NULL_SETS: u64 = 200;
 /// Data sets simulated for each size of a probe.
 const PROBE_SETS: u64 = 8;
 
+/// Data sets simulated for each other way to cut the walls.
+const CUT_SETS: u64 = 16;
+
 /// One data set in units of the declared model's scatter, less its expectation: for each run the mean lap times the root of the number of
-/// laps, then the trend times the root of the number of runs, then the second-order numbers. Under the declared model
-/// its entries are independent with variance 1.
+/// laps, then the trend times the root of the number of runs, then the second-order numbers; see [`Layout`]. Under the
+/// declared model its entries are independent with variance 1.
 pub(super) type White = DVector<f64>;
 
 /// The declared model's expectation, scatter, and the paths of the probes away from it.
 #[derive(Debug, Clone)]
 pub struct Atlas {
     pub(super) null: Expectation,
-    pub(super) scatter: Scatter,
+    /// Of each recording.
+    pub(super) scatter: Vec<Scatter>,
     /// What each simulated data set of the declared model says.
     pub(super) samples: Vec<Expectation>,
-    /// Laps of each run.
-    pub(super) laps: Vec<usize>,
+    pub(super) layout: Layout,
     pub(super) probes: Vec<Probe>,
     /// For each probe, for each of its sizes, the expectation in white; `None` where the robot crashes.
     pub(super) paths: Vec<Vec<Option<White>>>,
+    pub(super) spent: Spent,
+}
+
+/// A count of the data sets that were simulated for a diagnosis.
+#[derive(Debug, Default)]
+pub(super) struct Spent(AtomicU64);
+
+impl Spent {
+    pub(super) fn add(&self, sets: u64) {
+        self.0.fetch_add(sets, Ordering::Relaxed);
+    }
+}
+
+impl Clone for Spent {
+    fn clone(&self) -> Self {
+        Self(AtomicU64::new(self.0.load(Ordering::Relaxed)))
+    }
 }
 
 impl Atlas {
-    /// Simulates everything; `tick` is called after each simulated data set.
+    /// Simulates everything for one recording; `cuts` simulate the declared model with walls that another program may have
+    /// cut, which is no departure from it. `tick` is called after each simulated data set.
     ///
     /// # Errors
     /// A declared model that does not complete its laps.
-    pub fn new(simulate: &Simulate<'_>, tick: &(dyn Fn() + Sync)) -> Result<Self, Error> {
-        Self::with_probes(simulate, probes(), tick)
+    pub fn new(
+        simulate: &Simulate<'_>,
+        cuts: &[&Simulate<'_>],
+        tick: &(dyn Fn() + Sync),
+    ) -> Result<Self, Error> {
+        Self::with_probes(simulate, cuts, probes(), tick)
     }
 
     /// An atlas that knows no effect: enough to judge laps by, not to name what they lack.
     ///
     /// # Errors
     /// As [`Atlas::new`].
-    pub fn without_effects(simulate: &Simulate<'_>, tick: &(dyn Fn() + Sync)) -> Result<Self, Error> {
-        Self::with_probes(simulate, Vec::new(), tick)
+    pub fn without_effects(
+        simulate: &Simulate<'_>,
+        cuts: &[&Simulate<'_>],
+        tick: &(dyn Fn() + Sync),
+    ) -> Result<Self, Error> {
+        Self::with_probes(simulate, cuts, Vec::new(), tick)
     }
 
     fn with_probes(
         simulate: &Simulate<'_>,
+        cuts: &[&Simulate<'_>],
         probes: Vec<Probe>,
         tick: &(dyn Fn() + Sync),
     ) -> Result<Self, Error> {
@@ -66,49 +99,87 @@ impl Atlas {
             .into_par_iter()
             .map(|set| {
                 tick();
-                summary(simulate, &[], set).ok_or(Error::DeclaredModelStops)
+                let runs = simulate(&[], set).ok_or(Error::DeclaredModelStops)?;
+                Summary::new(&runs, &[runs.len()]).ok_or(Error::TooFewLaps)
             })
             .collect::<Result<_, _>>()?;
+        let laps: Vec<usize> = simulate(&[], 0)
+            .ok_or(Error::DeclaredModelStops)?
+            .iter()
+            .map(Vec::len)
+            .collect();
         let expectation = Expectation::of(null.iter(), true);
-        let scatter = Scatter::of(null.iter()).ok_or(Error::TooFewLaps)?;
-        let laps: Vec<usize> = null[0].runs.iter().map(|run| run.laps).collect();
-        let samples = null.iter().map(observed).collect();
+        let directions = directions(cuts, &null, tick);
+        let mean_laps = laps.iter().sum::<usize>() as f64 / laps.len() as f64;
+        let scatter = Scatter::of(null.iter().map(|summary| &summary.0[0]))
+            .and_then(|scatter| scatter.left_open(&directions, mean_laps))
+            .ok_or(Error::TooFewLaps)?;
         let mut atlas = Self {
+            samples: null.iter().map(observed).collect(),
+            layout: Layout {
+                laps: vec![laps],
+                lap: expectation.0[0].trend.len(),
+            },
             null: expectation,
-            scatter,
-            samples,
-            laps,
+            scatter: vec![scatter],
             probes,
             paths: Vec::new(),
+            spent: Spent::default(),
         };
         let same_draws = Expectation::of(null[..PROBE_SETS as usize].iter(), true);
         drop(null);
-        let jobs: Vec<(usize, usize)> = atlas
-            .probes
-            .iter()
-            .enumerate()
+        atlas.paths = atlas.simulate_paths(simulate, &same_draws, tick);
+        Ok(atlas)
+    }
+
+    /// The action of every probe at every size, by the same draws with and without it.
+    fn simulate_paths(
+        &self,
+        simulate: &Simulate<'_>,
+        same_draws: &Expectation,
+        tick: &(dyn Fn() + Sync),
+    ) -> Vec<Vec<Option<White>>> {
+        let jobs: Vec<(usize, usize)> = (self.probes.iter().enumerate())
             .flat_map(|(p, probe)| (0..probe.sizes.len()).map(move |k| (p, k)))
             .collect();
         let points: Vec<Option<White>> = jobs
             .par_iter()
             .map(|&(p, k)| {
-                let setting = [atlas.probes[p].setting(atlas.probes[p].sizes[k])];
+                let setting = [self.probes[p].setting(self.probes[p].sizes[k])];
                 let sets: Option<Vec<Summary>> = (0..PROBE_SETS)
                     .map(|set| {
                         tick();
-                        summary(simulate, &setting, set)
+                        self.summary(simulate, &setting, set)
                     })
                     .collect();
-                sets.map(|sets| atlas.white(&Expectation::of(sets.iter(), true), &same_draws))
+                sets.map(|sets| self.white(&Expectation::of(sets.iter(), true), same_draws))
             })
             .collect();
         let mut points = points.into_iter();
-        atlas.paths = atlas
-            .probes
-            .iter()
+        (self.probes.iter())
             .map(|probe| points.by_ref().take(probe.sizes.len()).collect())
+            .collect()
+    }
+
+    /// The atlas of several recordings together, from those of each.
+    pub fn join(parts: Vec<Self>) -> Option<Self> {
+        let probes = parts.first()?.probes.clone();
+        let samples = (0..NULL_SETS as usize)
+            .map(|set| Expectation::join(parts.iter().map(|part| part.samples[set].clone())))
             .collect();
-        Ok(atlas)
+        let paths = (0..probes.len()).map(|p| (0..probes[p].sizes.len()).map(|k| joined(&parts, p, k)).collect());
+        Some(Self {
+            null: Expectation::join(parts.iter().map(|part| part.null.clone())),
+            scatter: parts.iter().flat_map(|part| part.scatter.clone()).collect(),
+            samples,
+            layout: Layout {
+                laps: parts.iter().flat_map(|part| part.layout.laps.clone()).collect(),
+                lap: parts[0].layout.lap,
+            },
+            paths: paths.collect(),
+            probes,
+            spent: Spent::default(),
+        })
     }
 
     /// The atlas as bytes, for a cache.
@@ -118,7 +189,7 @@ impl Atlas {
             null: self.null.clone(),
             scatter: self.scatter.clone(),
             samples: self.samples.clone(),
-            laps: self.laps.clone(),
+            layout: self.layout.clone(),
             paths: self.paths.clone(),
         })
         .expect("numbers and lists have a form as bytes")
@@ -131,7 +202,7 @@ impl Atlas {
             null,
             scatter,
             samples,
-            laps,
+            layout,
             paths,
         } = postcard::from_bytes(bytes).ok()?;
         let probes = probes();
@@ -139,32 +210,99 @@ impl Atlas {
             null,
             scatter,
             samples,
-            laps,
+            layout,
             probes,
             paths,
+            spent: Spent::default(),
         })
     }
 
-    /// Number of data sets that [`Atlas::new`] simulates.
-    pub fn sets() -> u64 {
-        NULL_SETS + PROBE_SETS * probes().iter().map(|probe| probe.sizes.len() as u64).sum::<u64>()
+    /// Number of data sets that [`Atlas::new`] simulates with so many other cuts.
+    pub fn sets(cuts: usize) -> u64 {
+        let sizes: u64 = probes().iter().map(|probe| probe.sizes.len() as u64).sum();
+        Self::null_sets(cuts) + PROBE_SETS * sizes
     }
 
-    /// Number of data sets that [`Atlas::without_effects`] simulates.
-    pub fn null_sets() -> u64 {
-        NULL_SETS
+    /// Number of data sets that [`Atlas::without_effects`] simulates with so many other cuts.
+    pub fn null_sets(cuts: usize) -> u64 {
+        NULL_SETS + CUT_SETS * cuts as u64
     }
 
-    /// Time of a lap, s.
+    /// Number of data sets simulated for diagnoses, the atlas itself not counted.
+    pub fn spent(&self) -> u64 {
+        self.spent.0.load(Ordering::Relaxed)
+    }
+
+    /// Time of a lap, s: that of the first recording.
     pub(super) fn lap_s(&self) -> f64 {
-        let lap = &self.null.means[0];
+        let lap = &self.null.0[0].means[0];
         lap.rows(lap.len() - BLOCKS, BLOCKS).sum() / 100.0
+    }
+
+    /// Laps of a run: those of the first.
+    pub(super) fn run_laps(&self) -> usize {
+        self.layout.laps[0][0]
+    }
+
+    /// Whether data have the shape that the atlas was made for, run by run.
+    pub(super) fn observed(&self, runs: &[Vec<track::Lap>]) -> Result<Expectation, Error> {
+        let counts: Vec<usize> = self.layout.laps.iter().map(Vec::len).collect();
+        let shaped = runs.iter().map(Vec::len).eq(self.layout.laps.iter().flatten().copied());
+        let summary = Summary::new(runs, &counts).filter(|_| shaped);
+        Ok(observed(&summary.ok_or(Error::TooFewLaps)?))
+    }
+
+    /// What the data say without one run, which is one of several of its recording.
+    pub(super) fn observed_without(
+        &self,
+        runs: &[Vec<track::Lap>],
+        run: usize,
+    ) -> Result<Expectation, Error> {
+        let recording = self.layout.places().nth(run).map(|at| at.0);
+        let counts = (self.layout.laps.iter().enumerate())
+            .map(|(g, laps)| laps.len() - usize::from(Some(g) == recording));
+        let counts: Vec<usize> = counts.collect();
+        let mut others = runs.to_vec();
+        others.remove(run);
+        Ok(observed(&Summary::new(&others, &counts).ok_or(Error::TooFewLaps)?))
+    }
+
+    /// The summary of one simulated data set; `None` where a run crashes.
+    pub(super) fn summary(&self, simulate: &Simulate<'_>, effects: &[Setting], set: u64) -> Option<Summary> {
+        let counts: Vec<usize> = self.layout.laps.iter().map(Vec::len).collect();
+        Summary::new(&simulate(effects, set)?, &counts)
     }
 
     /// The difference of two expectations in units of the declared model's scatter.
     pub(super) fn white(&self, to: &Expectation, from: &Expectation) -> White {
-        white(&self.scatter, &self.laps, to, from)
+        white(&self.scatter, &self.layout, to, from)
     }
+}
+
+/// The action of a probe's size on all recordings.
+fn joined(parts: &[Atlas], probe: usize, size: usize) -> Option<White> {
+    let pieces: Vec<&White> = (parts.iter())
+        .map(|part| part.paths[probe][size].as_ref())
+        .collect::<Option<_>>()?;
+    let length = pieces.iter().map(|piece| piece.len()).sum();
+    Some(White::from_iterator(length, pieces.iter().flat_map(|piece| piece.iter().copied())))
+}
+
+/// How other cuts of the walls change the mean lap, by the same draws; a cut with which the robot crashes is left out.
+fn directions(cuts: &[&Simulate<'_>], null: &[Summary], tick: &(dyn Fn() + Sync)) -> Vec<DVector<f64>> {
+    let same_draws = Expectation::of(null[..CUT_SETS as usize].iter(), true);
+    let direction = |cut: &&Simulate<'_>| {
+        let sets: Option<Vec<Summary>> = (0..CUT_SETS)
+            .map(|set| {
+                tick();
+                let runs = cut(&[], set)?;
+                Summary::new(&runs, &[runs.len()])
+            })
+            .collect();
+        let mean = Expectation::of(sets?.iter(), true);
+        Some(&mean.0[0].means[0] - &same_draws.0[0].means[0])
+    };
+    cuts.par_iter().filter_map(direction).collect()
 }
 
 /// What a cache holds of an atlas.
@@ -172,9 +310,9 @@ impl Atlas {
 struct Stored {
     probes: String,
     null: Expectation,
-    scatter: Scatter,
+    scatter: Vec<Scatter>,
     samples: Vec<Expectation>,
-    laps: Vec<usize>,
+    layout: Layout,
     paths: Vec<Vec<Option<White>>>,
 }
 
@@ -186,27 +324,22 @@ fn fingerprint(probes: &[Probe]) -> String {
         .collect()
 }
 
-/// The difference of two expectations in units of a scatter.
-pub(super) fn white(scatter: &Scatter, laps: &[usize], to: &Expectation, from: &Expectation) -> White {
-    let runs = laps
-        .iter()
-        .enumerate()
-        .map(|(r, &n)| scatter.whiten(&(&to.means[r] - &from.means[r])) * (n as f64).sqrt());
-    let trend = scatter.whiten(&(&to.trend - &from.trend)) * (laps.len() as f64).sqrt();
-    let second = scatter.whiten_second(&(&to.second - &from.second));
-    let parts: Vec<DVector<f64>> = runs.chain([trend, second]).collect();
-    DVector::from_iterator(
-        parts.iter().map(|p| p.len()).sum(),
-        parts.iter().flat_map(|p| p.iter().copied()),
-    )
+/// The difference of two expectations in units of the scatter of each recording.
+pub(super) fn white(scatter: &[Scatter], layout: &Layout, to: &Expectation, from: &Expectation) -> White {
+    let mut parts: Vec<DVector<f64>> = Vec::new();
+    for (g, (scatter, laps)) in scatter.iter().zip(&layout.laps).enumerate() {
+        let (to, from) = (&to.0[g], &from.0[g]);
+        let run = |(r, &n): (usize, &usize)| {
+            scatter.whiten_mean(&(&to.means[r] - &from.means[r])) * (n as f64).sqrt()
+        };
+        parts.extend(laps.iter().enumerate().map(run));
+        parts.push(scatter.whiten(&(&to.trend - &from.trend)) * (laps.len() as f64).sqrt());
+        parts.push(scatter.whiten_second(&(&to.second - &from.second)));
+    }
+    DVector::from_iterator(layout.len(), parts.iter().flat_map(|p| p.iter().copied()))
 }
 
 /// What one data set says, in the form of an expectation: its runs are not pooled.
 pub(super) fn observed(summary: &Summary) -> Expectation {
     Expectation::of(std::iter::once(summary), false)
-}
-
-/// The summary of one simulated data set.
-pub(super) fn summary(simulate: &Simulate<'_>, effects: &[Setting], set: u64) -> Option<Summary> {
-    Summary::new(&simulate(effects, set)?)
 }

@@ -4,12 +4,11 @@ use rayon::prelude::*;
 
 use sim::Setting;
 
-use super::atlas::{Atlas, Simulate, White, observed};
+use super::atlas::{Atlas, Simulate, White};
 use super::expectation::Expectation;
 use super::hypothesis::Hypothesis;
 use super::refine::{Descended, Refined};
 use super::screen::Screened;
-use super::summary::Summary;
 use super::tests_of_fit::FourNumbers;
 use crate::{Answer, Candidate, Error, Explanation, Verdict};
 
@@ -53,10 +52,9 @@ impl Atlas {
     /// # Errors
     /// Runs of fewer than three laps, or of another shape than the atlas was made for.
     pub fn diagnose(&self, simulate: &Simulate<'_>, runs: &[Vec<track::Lap>]) -> Result<LapDiagnosis, Error> {
-        let summary = Summary::new(runs).ok_or(Error::TooFewLaps)?;
-        let data = observed(&summary);
+        let data = self.observed(runs)?;
         let residual = self.white(&data, &self.null);
-        let numbers = FourNumbers::new(&residual, &self.laps);
+        let numbers = FourNumbers::new(&residual, &self.layout);
         let screened = self.screen(&residual);
         let alarm = numbers.omnibus_p() < ALARM_P || self.best_score(&residual) > ALARM_SCORE;
         if !alarm {
@@ -125,13 +123,13 @@ impl Atlas {
         runs: &[Vec<track::Lap>],
         effects: &[Setting],
     ) -> Result<(FourNumbers, Option<FourNumbers>), Error> {
-        let data = observed(&Summary::new(runs).ok_or(Error::TooFewLaps)?);
-        let before = FourNumbers::new(&self.white(&data, &self.null), &self.laps);
+        let data = self.observed(runs)?;
+        let before = FourNumbers::new(&self.white(&data, &self.null), &self.layout);
         if effects.is_empty() {
             return Ok((before, Some(before)));
         }
         let after = self.remainder(simulate, &data, effects);
-        Ok((before, after.map(|residual| FourNumbers::new(&residual, &self.laps))))
+        Ok((before, after.map(|residual| FourNumbers::new(&residual, &self.layout))))
     }
 }
 
@@ -212,7 +210,7 @@ impl Search<'_> {
             })
             .collect();
         let excess = |squares: f64| squares - self.residual.len() as f64;
-        let remainder = FourNumbers::new(&refined.residual, &atlas.laps);
+        let remainder = FourNumbers::new(&refined.residual, &atlas.layout);
         Found {
             hypothesis: refined.hypothesis.clone(),
             explanation: Explanation {

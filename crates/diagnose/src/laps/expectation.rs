@@ -3,13 +3,17 @@
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use serde::{Deserialize, Serialize};
 
-use super::summary::{SECOND, Summary};
+use super::summary::{Recording, SECOND, Summary};
 
-/// Means of the summaries of simulated data sets.
+/// Means of the summaries of simulated data sets, recording by recording.
 ///
-/// A model whose runs are alike (`alike`) expects the same of each, so their summaries are pooled.
+/// A model whose runs are alike (`alike`) expects the same of each run of a recording, so their summaries are pooled.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub(super) struct Expectation {
+pub(super) struct Expectation(pub(super) Vec<Expected>);
+
+/// What is expected of one recording.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(super) struct Expected {
     /// Mean lap of each run.
     pub(super) means: Vec<DVector<f64>>,
     /// Trend within the runs, mean over them.
@@ -21,48 +25,73 @@ pub(super) struct Expectation {
 impl Expectation {
     /// The mean of several summaries of the same shape.
     pub(super) fn of<'a>(summaries: impl Iterator<Item = &'a Summary> + Clone, alike: bool) -> Self {
-        let first = summaries
-            .clone()
-            .next()
-            .expect("at least one data set is simulated");
-        let (runs, size) = (first.runs.len(), first.runs[0].mean.len());
-        let sets = summaries.clone().count() as f64;
-        let mut means = vec![DVector::zeros(size); runs];
-        let (mut trend, mut second) = (DVector::zeros(size), DVector::zeros(SECOND));
-        for summary in summaries {
-            for (mean, run) in means.iter_mut().zip(&summary.runs) {
-                mean.axpy(1.0 / sets, &run.mean, 1.0);
-                trend.axpy(1.0 / sets / runs as f64, &run.trend, 1.0);
-            }
-            second.axpy(1.0 / sets, &summary.second, 1.0);
-        }
-        let mut expectation = Self { means, trend, second };
-        if alike {
-            expectation.pool();
-        }
-        expectation
+        let recordings = summaries.clone().next().map_or(0, |first| first.0.len());
+        let expected = |g: usize| Expected::of(summaries.clone().map(move |summary| &summary.0[g]), alike);
+        Self((0..recordings).map(expected).collect())
     }
 
     /// The mean of several expectations of the same shape.
     pub(super) fn mean(all: &[Self], alike: bool) -> Self {
         let share = 1.0 / all.len() as f64;
-        let mut mean = all[0].moved(-1.0, &all[0].zero(), &all[0]);
-        for one in all {
-            mean = mean.moved(share, &one.zero(), one);
-        }
+        let zero = all[0].moved(-1.0, &all[0].zero(), &all[0]);
+        let mut mean = all.iter().fold(zero, |mean, one| mean.moved(share, &one.zero(), one));
         if alike {
-            mean.pool();
+            mean.0.iter_mut().for_each(Expected::pool);
         }
         mean
     }
 
     fn zero(&self) -> Self {
         let zero = |v: &DVector<f64>| DVector::zeros(v.len());
-        Self {
-            means: self.means.iter().map(zero).collect(),
-            trend: zero(&self.trend),
-            second: zero(&self.second),
+        let expected = |e: &Expected| Expected {
+            means: e.means.iter().map(zero).collect(),
+            trend: zero(&e.trend),
+            second: zero(&e.second),
+        };
+        Self(self.0.iter().map(expected).collect())
+    }
+
+    /// This expectation moved by `factor` times the difference of two others.
+    pub(super) fn moved(&self, factor: f64, from: &Self, to: &Self) -> Self {
+        let moved = |base: &DVector<f64>, a: &DVector<f64>, b: &DVector<f64>| base + (b - a) * factor;
+        let expected = |((base, a), b): ((&Expected, &Expected), &Expected)| Expected {
+            means: (0..base.means.len())
+                .map(|r| moved(&base.means[r], &a.means[r], &b.means[r]))
+                .collect(),
+            trend: moved(&base.trend, &a.trend, &b.trend),
+            second: moved(&base.second, &a.second, &b.second),
+        };
+        Self(self.0.iter().zip(&from.0).zip(&to.0).map(expected).collect())
+    }
+
+    /// Expectations of several recordings as one.
+    pub(super) fn join(parts: impl Iterator<Item = Self>) -> Self {
+        Self(parts.flat_map(|part| part.0).collect())
+    }
+}
+
+impl Expected {
+    fn of<'a>(recordings: impl Iterator<Item = &'a Recording> + Clone, alike: bool) -> Self {
+        let first = recordings
+            .clone()
+            .next()
+            .expect("at least one data set is simulated");
+        let (runs, size) = (first.runs.len(), first.runs[0].mean.len());
+        let sets = recordings.clone().count() as f64;
+        let mut means = vec![DVector::zeros(size); runs];
+        let (mut trend, mut second) = (DVector::zeros(size), DVector::zeros(SECOND));
+        for recording in recordings {
+            for (mean, run) in means.iter_mut().zip(&recording.runs) {
+                mean.axpy(1.0 / sets, &run.mean, 1.0);
+                trend.axpy(1.0 / sets / runs as f64, &run.trend, 1.0);
+            }
+            second.axpy(1.0 / sets, &recording.second, 1.0);
         }
+        let mut expected = Self { means, trend, second };
+        if alike {
+            expected.pool();
+        }
+        expected
     }
 
     /// Gives all runs the mean of their means.
@@ -70,82 +99,105 @@ impl Expectation {
         let pooled = self.means.iter().sum::<DVector<f64>>() / self.means.len() as f64;
         self.means.iter_mut().for_each(|mean| mean.clone_from(&pooled));
     }
-
-    /// This expectation moved by `factor` times the difference of two others.
-    pub(super) fn moved(&self, factor: f64, from: &Self, to: &Self) -> Self {
-        let moved = |base: &DVector<f64>, a: &DVector<f64>, b: &DVector<f64>| base + (b - a) * factor;
-        Self {
-            means: (0..self.means.len())
-                .map(|r| moved(&self.means[r], &from.means[r], &to.means[r]))
-                .collect(),
-            trend: moved(&self.trend, &from.trend, &to.trend),
-            second: moved(&self.second, &from.second, &to.second),
-        }
-    }
 }
 
-/// How a data set scatters about its expectation: the covariance of one lap and of the second-order numbers.
+/// How one recording scatters about its expectation: the covariance of one lap and of the second-order numbers.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(super) struct Scatter {
+    /// Of a lap.
     lap: Cholesky<f64, Dyn>,
+    /// Of a run's mean lap, as if it were one lap: with what the declaration leaves open.
+    mean: Cholesky<f64, Dyn>,
     second: Cholesky<f64, Dyn>,
+    /// What the declaration leaves open, as a covariance of a run's mean lap times the number of laps.
+    open: DMatrix<f64>,
     /// log det of the covariance of one lap.
     pub(super) log_det: f64,
 }
 
 impl Scatter {
-    /// The scatter within the runs of simulated data sets, and of their second-order numbers between data sets; `None` if
+    /// The scatter within the runs of simulated recordings, and of their second-order numbers between recordings; `None` if
     /// there are too few for the number of coordinates.
-    pub(super) fn of<'a>(summaries: impl Iterator<Item = &'a Summary> + Clone) -> Option<Self> {
-        let sets = summaries.clone().count();
-        let mean = Expectation::of(summaries.clone(), true).second;
+    pub(super) fn of<'a>(recordings: impl Iterator<Item = &'a Recording> + Clone) -> Option<Self> {
+        let sets = recordings.clone().count();
+        let mean = Expected::of(recordings.clone(), true).second;
         let mut second = DMatrix::zeros(SECOND, SECOND);
-        for summary in summaries.clone() {
-            let deviation = &summary.second - &mean;
+        for recording in recordings.clone() {
+            let deviation = &recording.second - &mean;
             second.ger(1.0 / (sets as f64 - 1.0), &deviation, &deviation, 1.0);
         }
         let spread = inflation(sets - 1, SECOND)?;
         let second = (second * spread).cholesky()?;
-        Self::with_second(summaries, second)
+        let size = recordings.clone().next()?.scatter.nrows();
+        Self::with(recordings, second, DMatrix::zeros(size, size))
     }
 
-    /// The scatter of the laps of these data sets, with another's scatter of the second-order numbers, which few data sets
+    /// The scatter of the laps of these recordings, with another's scatter of the second-order numbers, which few data sets
     /// do not determine.
     pub(super) fn of_laps<'a>(
-        summaries: impl Iterator<Item = &'a Summary> + Clone,
+        recordings: impl Iterator<Item = &'a Recording> + Clone,
         other: &Self,
     ) -> Option<Self> {
-        Self::with_second(summaries, other.second.clone())
+        Self::with(recordings, other.second.clone(), other.open.clone())
     }
 
-    fn with_second<'a>(
-        summaries: impl Iterator<Item = &'a Summary> + Clone,
-        second: Cholesky<f64, Dyn>,
-    ) -> Option<Self> {
-        let size = summaries.clone().next()?.scatter.nrows();
-        let (mut lap, mut freedom) = (DMatrix::zeros(size, size), 0);
-        for summary in summaries {
-            lap += &summary.scatter;
-            freedom += summary.freedom;
+    /// This scatter where the declaration leaves the mean lap open: `directions` are as likely as not, in units of a lap;
+    /// runs have `laps` laps.
+    pub(super) fn left_open(self, directions: &[DVector<f64>], laps: f64) -> Option<Self> {
+        let size = self.open.nrows();
+        let mut open = DMatrix::zeros(size, size);
+        for direction in directions {
+            open.ger(laps / directions.len() as f64, direction, direction, 1.0);
         }
-        let lap = (lap * (inflation(freedom, size)? / freedom as f64)).cholesky()?;
+        let l = self.lap.l();
+        let mean = (&l * l.transpose() + &open).cholesky()?;
+        Some(Self { mean, open, ..self })
+    }
+
+    fn with<'a>(
+        recordings: impl Iterator<Item = &'a Recording> + Clone,
+        second: Cholesky<f64, Dyn>,
+        open: DMatrix<f64>,
+    ) -> Option<Self> {
+        let size = open.nrows();
+        let (mut lap, mut freedom) = (DMatrix::zeros(size, size), 0);
+        for recording in recordings {
+            lap += &recording.scatter;
+            freedom += recording.freedom;
+        }
+        let lap = lap * (inflation(freedom, size)? / freedom as f64);
+        let mean = (&lap + &open).cholesky()?;
+        let lap = lap.cholesky()?;
         let log_det = 2.0 * lap.l_dirty().diagonal().iter().map(|x| x.ln()).sum::<f64>();
-        Some(Self { lap, second, log_det })
+        Some(Self {
+            lap,
+            mean,
+            second,
+            open,
+            log_det,
+        })
+    }
+
+    /// A run's mean lap in units of a lap's scatter and of what the declaration leaves open.
+    pub(super) fn whiten_mean(&self, mean: &DVector<f64>) -> DVector<f64> {
+        whiten(&self.mean, mean)
     }
 
     /// A vector of one lap's covariance in units of it.
     pub(super) fn whiten(&self, lap: &DVector<f64>) -> DVector<f64> {
-        let mut white = lap.clone();
-        self.lap.l_dirty().solve_lower_triangular_mut(&mut white);
-        white
+        whiten(&self.lap, lap)
     }
 
     /// Second-order numbers in units of their covariance.
     pub(super) fn whiten_second(&self, second: &DVector<f64>) -> DVector<f64> {
-        let mut white = second.clone();
-        self.second.l_dirty().solve_lower_triangular_mut(&mut white);
-        white
+        whiten(&self.second, second)
     }
+}
+
+fn whiten(covariance: &Cholesky<f64, Dyn>, vector: &DVector<f64>) -> DVector<f64> {
+    let mut white = vector.clone();
+    covariance.l_dirty().solve_lower_triangular_mut(&mut white);
+    white
 }
 
 /// What makes the inverse of a covariance estimated with `freedom` degrees of freedom in `size` dimensions unbiased (the mean

@@ -4,7 +4,7 @@ use sim::{Pattern, Setting};
 
 use super::atlas::Atlas;
 use super::probe::Probe;
-use super::summary::ramp;
+use super::screen::worth;
 
 /// How an effect goes over the runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -59,7 +59,7 @@ impl Freedom {
 }
 
 impl Part {
-    /// A probe at sizes that a screening found: one, one for each run, or one with the change over the ramp of a run's laps.
+    /// A probe at sizes that a screening found: one, one for each run, or one with its change from lap to lap.
     pub(super) fn screened(atlas: &Atlas, probe: usize, shape: Shape, sizes: &[f64]) -> Self {
         let p = &atlas.probes[probe];
         let clamped = |size: f64| p.clamped(&p.values(p.quantum.map_or(size, |q| (size / q).round() * q)));
@@ -77,11 +77,9 @@ impl Part {
                 per_s: 0.0,
             },
             Shape::ByTime => {
-                let steps = ramp(atlas.laps[0]);
-                let per_lap = sizes[1] * (steps[1] - steps[0]);
-                let per_s = per_lap / atlas.lap_s();
+                let per_s = sizes[1] / atlas.lap_s();
                 // The kept laps begin one and a half laps after the run, on average.
-                let middle_s = (1.5 + atlas.laps[0] as f64 / 2.0) * atlas.lap_s();
+                let middle_s = (1.5 + atlas.run_laps() as f64 / 2.0) * atlas.lap_s();
                 Self {
                     probe,
                     shape,
@@ -151,7 +149,7 @@ impl Part {
             }
         }
         if self.shape == Shape::ByTime {
-            let run_s = atlas.laps[0] as f64 * atlas.lap_s();
+            let run_s = atlas.run_laps() as f64 * atlas.lap_s();
             freedoms.push(Freedom {
                 part,
                 run: None,
@@ -175,6 +173,15 @@ impl Hypothesis {
     /// Whether all runs are alike.
     pub(super) fn alike(&self) -> bool {
         self.parts.iter().all(|part| part.shape != Shape::ByRun)
+    }
+
+    /// What counts of a gain in log-likelihood.
+    pub(super) fn worth(&self, gain: f64) -> f64 {
+        self.parts
+            .iter()
+            .map(|part| part.shape)
+            .find(|shape| *shape != Shape::Constant)
+            .map_or(gain, |shape| worth(gain, shape))
     }
 
     /// The numbers that a fit may change.

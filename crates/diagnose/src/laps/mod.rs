@@ -4,6 +4,7 @@ mod atlas;
 mod diagnosis;
 mod expectation;
 mod hypothesis;
+mod layout;
 mod pairs;
 mod probe;
 mod refine;

@@ -61,7 +61,7 @@ impl Atlas {
                 }
             }
         }
-        let laps = self.laps.iter().sum();
+        let laps = self.layout.total_laps();
         let mut pairs: Vec<ScreenedPair> = best
             .into_iter()
             .map(|((a, b), (gain, sizes))| {

@@ -4,9 +4,10 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use sim::{Pattern, Setting};
 
-use super::atlas::{Atlas, Simulate, White, observed, summary, white};
+use super::atlas::{Atlas, Simulate, White, white};
 use super::expectation::{Expectation, Scatter};
 use super::hypothesis::{Freedom, Hypothesis};
+use super::layout::Layout;
 use super::screen::price;
 use super::summary::Summary;
 use crate::Error;
@@ -73,11 +74,11 @@ impl Atlas {
         let mut score = f64::NEG_INFINITY;
         for _ in 0..rounds {
             let local = self.local(simulate, &hypothesis, &freedoms)?;
-            let target = white(&local.scatter, &self.laps, data, &local.center);
+            let target = white(&local.scatter, &self.layout, data, &local.center);
             let (moves, covariance) = nearest(&local.columns, &target, &freedoms);
             let left = left_of(&local.columns, &target, &moves).norm_squared() / (1.0 + local.error);
             score =
-                self.gain(data, left, local.scatter.log_det) - price(freedoms.len(), self.laps.iter().sum());
+                self.gain(data, left, &local.scatter) - price(freedoms.len(), self.layout.total_laps());
             let settled = (0..moves.len()).all(|i| moves[i].abs() < 0.5 * covariance[(i, i)].sqrt());
             let by: Vec<(Freedom, f64)> = freedoms.iter().copied().zip(moves.iter().copied()).collect();
             hypothesis = hypothesis.moved(self, &by);
@@ -99,11 +100,8 @@ impl Atlas {
         })
     }
 
-    /// For each run a hypothesis with sizes fitted to the other runs alone, by the parabolas about its sizes; a size of the run
-    /// itself becomes the mean of the others'.
-    ///
-    /// # Errors
-    /// Other runs of fewer than three laps, or a robot that crashes.
+    /// For each run the effects with sizes fitted to the other runs alone, by the parabolas about the hypothesis' sizes; a
+    /// size of the run itself becomes the mean of the others'. Where the robot crashes beside these sizes, they stay.
     pub(super) fn leave_out(
         &self,
         simulate: &Simulate<'_>,
@@ -111,31 +109,52 @@ impl Atlas {
         hypothesis: &Hypothesis,
     ) -> Result<Vec<Vec<Setting>>, Error> {
         let freedoms = hypothesis.freedoms(self);
-        let local = self.local(simulate, hypothesis, &freedoms).ok_or(Error::Crash)?;
-        let lap = self.null.trend.len();
-        let fit_without = |left_out: usize| {
-            let others: Vec<Vec<track::Lap>> = runs
-                .iter()
-                .enumerate()
-                .filter(|(r, _)| *r != left_out)
-                .map(|(_, laps)| laps.clone())
-                .collect();
-            let mut data = observed(&Summary::new(&others).ok_or(Error::TooFewLaps)?);
-            data.means.insert(left_out, local.center.means[left_out].clone());
-            let target = white(&local.scatter, &self.laps, &data, &local.center);
-            let mut columns = local.columns.clone();
-            for column in &mut columns {
-                column.slope.rows_mut(left_out * lap, lap).fill(0.0);
-                column.curvature.rows_mut(left_out * lap, lap).fill(0.0);
-            }
-            let (moves, _) = nearest(&columns, &target, &freedoms);
-            let moves: Vec<(Freedom, f64)> = freedoms.iter().copied().zip(moves.iter().copied()).collect();
-            let moved = self
-                .quantised(hypothesis.moved(self, &moves))
-                .with_mean_size(left_out);
-            Ok(moved.settings(self))
+        let local = self.local(simulate, hypothesis, &freedoms);
+        let fit_without = |run: usize| {
+            let found = match &local {
+                Some(local) => self.fit_without(run, local, runs, hypothesis, &freedoms)?,
+                None => hypothesis.clone(),
+            };
+            Ok(found.with_mean_size(run).settings(self))
         };
-        (0..runs.len()).map(fit_without).collect()
+        (0..self.layout.runs()).map(fit_without).collect()
+    }
+
+    fn fit_without(
+        &self,
+        run: usize,
+        local: &Local,
+        runs: &[Vec<track::Lap>],
+        hypothesis: &Hypothesis,
+        freedoms: &[Freedom],
+    ) -> Result<Hypothesis, Error> {
+        let (recording, place) = self.layout.places().nth(run).unwrap_or_default();
+        let alone = self.layout.laps[recording].len() == 1;
+        let mut data = self.observed(runs)?;
+        if !alone {
+            data.0[recording] = self.observed_without(runs, run)?.0.remove(recording);
+        }
+        data.0[recording]
+            .means
+            .insert(place, local.center.0[recording].means[place].clone());
+        if alone {
+            data.0[recording].means.truncate(1);
+        }
+        let target = white(&local.scatter, &self.layout, &data, &local.center);
+        let mut own = vec![self.layout.run(run)];
+        if alone {
+            own.extend([self.layout.trend(recording), self.layout.second(recording)]);
+        }
+        let mut columns = local.columns.clone();
+        for column in &mut columns {
+            for range in &own {
+                column.slope.rows_mut(range.start, range.len()).fill(0.0);
+                column.curvature.rows_mut(range.start, range.len()).fill(0.0);
+            }
+        }
+        let (moves, _) = nearest(&columns, &target, freedoms);
+        let moves: Vec<(Freedom, f64)> = freedoms.iter().copied().zip(moves.iter().copied()).collect();
+        Ok(self.quantised(hypothesis.moved(self, &moves)))
     }
 
     /// A hypothesis at its most likely sizes, simulated often enough to judge it.
@@ -151,11 +170,22 @@ impl Atlas {
 
     /// Log-likelihood gained over the declared model by a hypothesis that leaves a squared distance of `left` in units of its own
     /// scatter.
-    fn gain(&self, data: &Expectation, left: f64, log_det: f64) -> f64 {
+    fn gain(&self, data: &Expectation, left: f64, scatter: &[Scatter]) -> f64 {
         let before = self.white(data, &self.null).norm_squared();
-        // Every run's mean lap and the trend are each a draw of one lap's covariance.
-        let vectors = (self.laps.len() + 1) as f64;
-        0.5 * (before - left - vectors * (log_det - self.scatter.log_det))
+        // Every run's mean lap and every recording's trend are each a draw of one lap's covariance.
+        let draws = |g: usize| (self.layout.laps[g].len() + 1) as f64;
+        let wider: f64 = (scatter.iter().zip(&self.scatter).enumerate())
+            .map(|(g, (own, declared))| draws(g) * (own.log_det - declared.log_det))
+            .sum();
+        0.5 * (before - left - wider)
+    }
+
+    /// The scatter of simulated data sets, recording by recording.
+    fn scatter_of<'a>(&self, summaries: impl Iterator<Item = &'a Summary> + Clone) -> Option<Vec<Scatter>> {
+        let of = |(g, declared): (usize, &Scatter)| {
+            Scatter::of_laps(summaries.clone().map(move |summary| &summary.0[g]), declared)
+        };
+        self.scatter.iter().enumerate().map(of).collect()
     }
 
     /// Sizes that come in steps brought to the nearest.
@@ -180,10 +210,10 @@ impl Atlas {
         errors: Vec<(Freedom, f64)>,
         end: &Evaluated,
     ) -> Option<Refined> {
-        let scatter = Scatter::of_laps(end.summaries.iter(), &self.scatter)?;
-        let residual = white(&scatter, &self.laps, data, &end.expectation) / (1.0 + end.error).sqrt();
-        let gain = self.gain(data, residual.norm_squared(), scatter.log_det);
-        let score = gain - price(errors.len(), self.laps.iter().sum());
+        let scatter = self.scatter_of(end.summaries.iter())?;
+        let residual = white(&scatter, &self.layout, data, &end.expectation) / (1.0 + end.error).sqrt();
+        let gain = self.gain(data, residual.norm_squared(), &scatter);
+        let score = hypothesis.worth(gain) - price(errors.len(), self.layout.total_laps());
         Some(Refined {
             hypothesis,
             errors,
@@ -202,8 +232,8 @@ impl Atlas {
     ) -> Option<White> {
         let alike = !effects.iter().any(|e| matches!(e.pattern, Pattern::ByRun(_)));
         let end = self.simulated(simulate, effects, alike, FINAL_SETS)?;
-        let scatter = Scatter::of_laps(end.summaries.iter(), &self.scatter)?;
-        Some(white(&scatter, &self.laps, data, &end.expectation) / (1.0 + end.error).sqrt())
+        let scatter = self.scatter_of(end.summaries.iter())?;
+        Some(white(&scatter, &self.layout, data, &end.expectation) / (1.0 + end.error).sqrt())
     }
 
     /// Simulates a hypothesis. What the draws of these data sets did to the declared model is taken off as far as it
@@ -219,9 +249,10 @@ impl Atlas {
         alike: bool,
         sets: u64,
     ) -> Option<Evaluated> {
+        self.spent.add(sets);
         let summaries: Vec<Summary> = (0..sets)
             .into_par_iter()
-            .map(|set| summary(simulate, settings, set))
+            .map(|set| self.summary(simulate, settings, set))
             .collect::<Option<_>>()?;
         let mean = Expectation::of(summaries.iter(), alike);
         let declared = &self.samples[..sets as usize];
@@ -261,9 +292,8 @@ impl Atlas {
         let all = sides
             .iter()
             .flat_map(|(_, a, b)| a.1.summaries.iter().chain(&b.1.summaries));
-        let scatter = Scatter::of_laps(center.summaries.iter().chain(all), &self.scatter)?;
-        let action = |e: &Evaluated| white(&scatter, &self.laps, &e.expectation, &center.expectation);
-        let lap = self.null.trend.len();
+        let scatter = self.scatter_of(center.summaries.iter().chain(all))?;
+        let action = |e: &Evaluated| white(&scatter, &self.layout, &e.expectation, &center.expectation);
         let mut columns = Vec::new();
         for (group, (down_by, down), (up_by, up)) in &sides {
             let (down, up) = (action(down), action(up));
@@ -271,7 +301,7 @@ impl Atlas {
                 let mask = |w: &White| {
                     freedom
                         .run()
-                        .map_or_else(|| w.clone(), |run| of_run(w, run, lap, self.laps.len()))
+                        .map_or_else(|| w.clone(), |run| of_run(w, run, &self.layout))
                 };
                 columns.push(Column::through((down_by[i], mask(&down)), (up_by[i], mask(&up))));
             }
@@ -297,15 +327,18 @@ fn groups(freedoms: &[Freedom]) -> Vec<Vec<Freedom>> {
     groups
 }
 
-/// What one run's size does: that run's mean, and its share of the trend and the second-order numbers.
-fn of_run(action: &White, run: usize, lap: usize, runs: usize) -> White {
-    let mut own = action / runs as f64;
-    for r in 0..runs {
-        if r == run {
-            own.rows_mut(r * lap, lap).copy_from(&action.rows(r * lap, lap));
-        } else {
-            own.rows_mut(r * lap, lap).fill(0.0);
-        }
+/// What one run's size does: that run's mean, and its share of its recording's trend and second-order numbers.
+fn of_run(action: &White, run: usize, layout: &Layout) -> White {
+    let mut own = White::zeros(action.len());
+    let recording = layout.places().nth(run).map_or(0, |at| at.0);
+    let share = 1.0 / layout.laps[recording].len() as f64;
+    for (range, share) in [
+        (layout.run(run), 1.0),
+        (layout.trend(recording), share),
+        (layout.second(recording), share),
+    ] {
+        own.rows_mut(range.start, range.len())
+            .axpy(share, &action.rows(range.start, range.len()), 1.0);
     }
     own
 }
@@ -314,7 +347,7 @@ fn of_run(action: &White, run: usize, lap: usize, runs: usize) -> White {
 struct Local {
     center: Expectation,
     error: f64,
-    scatter: Scatter,
+    scatter: Vec<Scatter>,
     columns: Vec<Column>,
 }
 

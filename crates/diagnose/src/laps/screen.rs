@@ -1,7 +1,10 @@
 //! Which probes could explain a residual, by the paths that were simulated beforehand.
 
+use std::ops::Range;
+
 use super::atlas::{Atlas, White};
 use super::hypothesis::{Hypothesis, Part, Shape};
+use super::layout::ramp_norm;
 
 /// A probe at the size that explains most.
 #[derive(Debug, Clone)]
@@ -60,6 +63,21 @@ impl Atlas {
         nodes
     }
 
+    /// What a size that grows by one from lap to lap does to the trends, by what it does to the mean laps.
+    fn change_per_lap(&self, tangent: &White) -> White {
+        let mut change = White::zeros(tangent.len());
+        let mut runs = 0;
+        for (recording, laps) in self.layout.laps.iter().enumerate() {
+            let of_run = self.layout.run(runs);
+            let factor = (laps.len() as f64 / laps[0] as f64).sqrt() * ramp_norm(laps[0]);
+            change
+                .rows_mut(self.layout.trend(recording).start, self.layout.lap)
+                .axpy(factor, &tangent.rows(of_run.start, of_run.len()), 1.0);
+            runs += laps.len();
+        }
+        change
+    }
+
     fn screen_one(
         &self,
         probe: usize,
@@ -68,45 +86,41 @@ impl Atlas {
         residual: &White,
     ) -> Option<Screened> {
         let p = &self.probes[probe];
-        let size = residual.len();
-        let runs = self.laps.len();
-        let lap = self.null.trend.len();
+        let runs = self.layout.runs();
+        let everything = 0..residual.len();
         let (size_at, action, fitted) = match shape {
             Shape::Constant => {
-                let (s, action) = nearest(nodes, residual, 0, size)?;
+                let (s, action) = nearest(nodes, residual, everything)?;
                 (vec![s], action, p.free.len())
             }
             Shape::ByRun => {
                 if runs < 2 {
                     return None;
                 }
-                let mut action = White::zeros(size);
-                let mut sizes = Vec::with_capacity(runs);
-                for r in 0..runs {
-                    let (s, part) = nearest(nodes, residual, r * lap, lap)?;
-                    action.rows_mut(r * lap, lap).copy_from(&part.rows(r * lap, lap));
-                    sizes.push(s);
+                let parts: Option<Vec<(f64, White)>> = (0..runs)
+                    .map(|run| nearest(nodes, residual, self.layout.run(run)))
+                    .collect();
+                let parts = parts?;
+                let mut action = at(nodes, parts.iter().map(|part| part.0).sum::<f64>() / runs as f64);
+                for (run, (_, part)) in parts.iter().enumerate() {
+                    let range = self.layout.run(run);
+                    action
+                        .rows_mut(range.start, range.len())
+                        .copy_from(&part.rows(range.start, range.len()));
                 }
-                let middle = at(nodes, sizes.iter().sum::<f64>() / runs as f64);
-                let rest = runs * lap;
-                action
-                    .rows_mut(rest, size - rest)
-                    .copy_from(&middle.rows(rest, size - rest));
+                let sizes = parts.into_iter().map(|part| part.0).collect();
                 (sizes, action, p.free.len() - 1 + runs)
             }
             Shape::ByTime => {
-                let (s, mut action) = nearest(nodes, residual, 0, size)?;
-                // The change of one run's mean lap with the size, as the trend's entries see it.
-                let tangent = tangent(nodes, s).rows(0, lap) * ((runs as f64) / self.laps[0] as f64).sqrt();
-                let left = residual.rows(runs * lap, lap) - action.rows(runs * lap, lap);
-                let slope = tangent.dot(&left) / tangent.norm_squared().max(f64::MIN_POSITIVE);
-                action.rows_mut(runs * lap, lap).axpy(slope, &tangent, 1.0);
-                (vec![s, slope], action, p.free.len() + 1)
+                let (s, action) = nearest(nodes, residual, everything)?;
+                let change = self.change_per_lap(&tangent(nodes, s));
+                let left = residual - &action;
+                let slope = change.dot(&left) / change.norm_squared().max(f64::MIN_POSITIVE);
+                (vec![s, slope], action + change * slope, p.free.len() + 1)
             }
         };
         let gain = residual.norm_squared() - (residual - &action).norm_squared();
-        let laps = self.laps.iter().sum();
-        let score = 0.5 * gain - price(fitted, laps);
+        let score = worth(0.5 * gain, shape) - price(fitted, self.layout.total_laps());
         Some(Screened {
             hypothesis: Hypothesis {
                 parts: vec![Part::screened(self, probe, shape, &size_at)],
@@ -116,9 +130,21 @@ impl Atlas {
     }
 }
 
-/// The point of a path that is nearest to the residual in `count` entries from `first`, and its size. Beyond its ends the path
-/// goes on straight for half its last piece.
-fn nearest(nodes: &[(f64, White)], residual: &White, first: usize, count: usize) -> Option<(f64, White)> {
+/// What counts of a gain: at very high signal no model is exact, and sizes that may go over the runs follow its faults.
+pub(super) fn worth(gain: f64, shape: Shape) -> f64 {
+    /// Share of a gain that is not trusted, and what a pattern has to gain beside its numbers.
+    const FAULTS: f64 = 0.01;
+    const PATTERN: f64 = 4.0;
+    match shape {
+        Shape::Constant => gain,
+        Shape::ByRun | Shape::ByTime => (1.0 - FAULTS) * gain - PATTERN,
+    }
+}
+
+/// The point of a path that is nearest to the residual in some entries, and its size. Beyond its ends the path goes on
+/// straight for half its last piece.
+fn nearest(nodes: &[(f64, White)], residual: &White, entries: Range<usize>) -> Option<(f64, White)> {
+    let (first, count) = (entries.start, entries.len());
     let target = residual.rows(first, count);
     let mut best: Option<(f64, f64, White)> = None;
     for (i, pair) in nodes.windows(2).enumerate() {

@@ -3,6 +3,8 @@
 use nalgebra::{DMatrix, DVector};
 use track::Lap;
 
+use super::layout::ramp_norm;
+
 /// Blocks of gates whose durations are part of a lap's vector.
 pub(super) const BLOCKS: usize = 20;
 
@@ -34,17 +36,33 @@ pub(super) fn lap_vector(lap: &Lap) -> DVector<f64> {
 /// What one run tells of its laps' mean and its change.
 #[derive(Debug, Clone)]
 pub(super) struct RunSummary {
-    /// Number of laps.
-    pub(super) laps: usize,
     /// Mean lap.
     pub(super) mean: DVector<f64>,
     /// Sum over the laps of lap x position in the run, the positions centred and of unit norm: its covariance is that of one lap.
     pub(super) trend: DVector<f64>,
 }
 
-/// What a data set tells.
+/// What a data set tells: recording by recording, each of runs under the same declaration.
 #[derive(Debug, Clone)]
-pub(crate) struct Summary {
+pub(super) struct Summary(pub(super) Vec<Recording>);
+
+impl Summary {
+    /// The summary of runs of closed laps, `counts` of them in each recording; `None` if a run has fewer than three, or
+    /// they have too few gates.
+    pub(super) fn new(runs: &[Vec<Lap>], counts: &[usize]) -> Option<Self> {
+        let mut rest = runs;
+        let recordings = counts.iter().map(|&count| {
+            let (own, others) = rest.split_at_checked(count)?;
+            rest = others;
+            Recording::new(own)
+        });
+        recordings.collect::<Option<_>>().map(Self)
+    }
+}
+
+/// What the runs of one recording tell.
+#[derive(Debug, Clone)]
+pub(super) struct Recording {
     pub(super) runs: Vec<RunSummary>,
     /// See [`second_order`].
     pub(super) second: DVector<f64>,
@@ -53,9 +71,8 @@ pub(crate) struct Summary {
     pub(super) freedom: usize,
 }
 
-impl Summary {
-    /// The summary of runs of closed laps; `None` if a run has fewer than three, or they have too few gates.
-    pub(crate) fn new(runs: &[Vec<Lap>]) -> Option<Self> {
+impl Recording {
+    fn new(runs: &[Vec<Lap>]) -> Option<Self> {
         let vectors: Vec<Vec<DVector<f64>>> = runs
             .iter()
             .map(|laps| laps.iter().map(lap_vector).collect())
@@ -92,9 +109,9 @@ impl Summary {
 }
 
 /// Positions of n laps in their run, centred and of unit norm.
-pub(super) fn ramp(n: usize) -> Vec<f64> {
+fn ramp(n: usize) -> Vec<f64> {
     let middle = (n as f64 - 1.0) / 2.0;
-    let norm = (0..n).map(|j| (j as f64 - middle).powi(2)).sum::<f64>().sqrt();
+    let norm = ramp_norm(n);
     (0..n).map(|j| (j as f64 - middle) / norm).collect()
 }
 
@@ -105,11 +122,7 @@ fn summarise(laps: &[DVector<f64>]) -> RunSummary {
         mean.axpy(1.0 / laps.len() as f64, lap, 1.0);
         trend.axpy(position, lap, 1.0);
     }
-    RunSummary {
-        laps: laps.len(),
-        mean,
-        trend,
-    }
+    RunSummary { mean, trend }
 }
 
 /// How the laps scatter, as [`SECOND`] numbers: log variance about the means of a run's quarters in 10 blocks of gates and

@@ -3,6 +3,7 @@
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::atlas::White;
+use super::layout::Layout;
 use super::summary::SECOND;
 
 /// A sum of squares with its probability under the expectation.
@@ -46,25 +47,30 @@ pub struct FourNumbers {
 }
 
 impl FourNumbers {
-    /// Of a residual in white; `laps` are the numbers of laps of the runs.
-    pub(super) fn new(residual: &White, laps: &[usize]) -> Self {
-        let runs = laps.len();
-        let lap = (residual.len() - SECOND) / (runs + 1);
-        let total: usize = laps.iter().sum();
-        let mut mean = White::zeros(lap);
-        for (r, &n) in laps.iter().enumerate() {
-            mean.axpy(
-                (n as f64 / total as f64).sqrt(),
-                &residual.rows(r * lap, lap).into_owned(),
-                1.0,
-            );
+    /// Of a residual in white.
+    pub(super) fn new(residual: &White, layout: &Layout) -> Self {
+        let squares = |range: std::ops::Range<usize>| residual.rows(range.start, range.len()).norm_squared();
+        let recordings = layout.laps.len();
+        let (mut all, mut means) = (0.0, 0.0);
+        for (recording, laps) in layout.laps.iter().enumerate() {
+            let total: usize = laps.iter().sum();
+            let mut mean = White::zeros(layout.lap);
+            for (run, (_, place)) in layout.places().enumerate().filter(|(_, at)| at.0 == recording) {
+                let range = layout.run(run);
+                let share = (laps[place] as f64 / total as f64).sqrt();
+                mean.axpy(share, &residual.rows(range.start, range.len()), 1.0);
+                all += squares(range);
+            }
+            means += mean.norm_squared();
         }
-        let all = residual.rows(0, runs * lap).norm_squared();
+        let each = |range: &dyn Fn(usize) -> std::ops::Range<usize>| {
+            (0..recordings).map(|g| squares(range(g))).sum::<f64>()
+        };
         Self {
-            mean: Quadratic::new(mean.norm_squared(), lap),
-            runs: Quadratic::new(all - mean.norm_squared(), (runs - 1) * lap),
-            trend: Quadratic::new(residual.rows(runs * lap, lap).norm_squared(), lap),
-            noise: Quadratic::new(residual.rows((runs + 1) * lap, SECOND).norm_squared(), SECOND),
+            mean: Quadratic::new(means, recordings * layout.lap),
+            runs: Quadratic::new(all - means, (layout.runs() - recordings) * layout.lap),
+            trend: Quadratic::new(each(&|g| layout.trend(g)), recordings * layout.lap),
+            noise: Quadratic::new(each(&|g| layout.second(g)), recordings * SECOND),
         }
     }
 

@@ -7,17 +7,18 @@ use sim::{Model, Pattern, Scene, Setting, Stage, World, find};
 use track::Side;
 
 use super::catalogue::{Variant, unlisted_variants, variants};
-use super::corners::{Corners, EXACT, recut};
 use super::decide::{Decided, decided};
 use super::evidence::Evidence;
 use super::filter::{MEASURED, Trace};
 use super::noise::noises;
 use super::pairs::pairs;
+use super::recut::recut;
 use super::refine::jumps;
 use super::rows::LogRow;
 use super::screen::normals;
 use super::search::{By, Lead, Refined, leads, price, pursue, shortlist, tail, together};
 use super::steps::reading_step;
+use crate::corners::{Corners, EXACT};
 use crate::{Answer, Candidate, Cause, Error, Explanation, Verdict};
 
 /// How white the filter's innovations of one measured number are.
@@ -67,7 +68,7 @@ pub fn diagnose_logs(model: &Model, scene: &Scene, runs: &[&[LogRow]]) -> Result
     if declared.stretches.is_empty() {
         return Err(Error::NoLog);
     }
-    let first = recut(&scene, model, &wide, &declared, &[]);
+    let first = recut(&scene, &wide, &declared, &[]);
     let mut search = Search::new(
         declared.elsewhere(first.as_ref().map_or(&scene, |found| &found.1)),
         step,
@@ -81,7 +82,7 @@ pub fn diagnose_logs(model: &Model, scene: &Scene, runs: &[&[LogRow]]) -> Result
         .found
         .first()
         .map_or(Vec::new(), |best| best.settings.clone());
-    let again = recut(&scene, model, &wide, &declared, &settings);
+    let again = recut(&scene, &wide, &declared, &settings);
     let better = again.as_ref().map_or(&scene, |found| &found.1);
     if corners(&again) == corners(&first) {
         search.finish(&leads);

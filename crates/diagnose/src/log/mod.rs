@@ -7,7 +7,6 @@
 
 mod catalogue;
 mod columns;
-mod corners;
 mod decide;
 mod diagnosis;
 mod evidence;
@@ -15,13 +14,13 @@ mod filter;
 mod moments;
 mod noise;
 mod pairs;
+mod recut;
 mod refine;
 mod rows;
 mod screen;
 mod search;
 mod steps;
 
-pub use corners::Corners;
 pub use decide::Decided;
 pub use diagnosis::{Channel, LogDiagnosis, diagnose_logs};
 pub use rows::LogRow;

@@ -2,10 +2,8 @@
 //! and where a wall is nearly straight a micrometre of tolerance moves a corner by centimetres. The logs say which
 //! points were looked at.
 
-use sim::{Model, Scene, Setting, Vec2};
+use sim::{Model, Scene, Vec2};
 use track::{Chain, Side, Vertex, Wall};
-
-use super::evidence::Evidence;
 
 /// Points looked at in each span of a spline, and whether the chord ends at the last of them that is good or at the
 /// first that is not.
@@ -23,56 +21,40 @@ pub(crate) const EXACT: Corners = Corners {
     before: true,
 };
 
-/// What programs commonly look at.
-const PER_SPAN: [usize; 7] = [50, 64, 100, 128, 200, 256, 500];
+/// The declared walls cut by programs that look at so many points of each span, where that gives as many pieces as the
+/// exact cut; another number of pieces would be another declaration. `model` is what the scenes are for.
+pub(crate) fn cuts(scene: &Scene, model: &Model, per_span: &[usize]) -> Vec<(Corners, Scene)> {
+    let counts = scene.chains().map(|chain| chain.vertices.len());
+    let ways = per_span.iter().flat_map(|&per_span| {
+        [true, false].map(|before| Corners { per_span, before })
+    });
+    ways.filter_map(|corners| {
+        let course = &scene.circuit().course;
+        let [outer, inner] = [Side::Outer, Side::Inner]
+            .map(|side| cut(course.wall(side), model.wall.max_error_m, corners));
+        let same = [outer.vertices.len(), inner.vertices.len()] == counts;
+        same.then(|| (corners, scene.recut(model, outer, inner)))
+    })
+    .collect()
+}
 
-/// The scene whose corners the logs like best beside these effects, if they like it clearly better than the declared one.
-pub(crate) fn recut(
-    scene: &Scene,
-    model: &Model,
-    wide: &Model,
-    evidence: &Evidence<'_>,
-    settings: &[Setting],
-) -> Option<(Corners, Scene)> {
-    /// Log-likelihood by which another cut must win.
-    const CLEARLY: f64 = 12.0;
-    let first = evidence.of_run(*evidence.runs().first()?);
-    let [outer, inner] = scene.chains().map(|chain| chain.vertices.len());
-    let mut tried: Vec<(f64, Corners, Scene)> = Vec::new();
-    for per_span in PER_SPAN {
-        for before in [true, false] {
-            let chain = |side| {
-                cut(
-                    scene.circuit().course.wall(side),
-                    model.wall.max_error_m,
-                    per_span,
-                    before,
-                )
-            };
-            let chains = [chain(Side::Outer), chain(Side::Inner)];
-            // A cut with another number of pieces is another declaration.
-            if chains[0].vertices.len() == outer && chains[1].vertices.len() == inner {
-                let [outer, inner] = chains;
-                let scene = scene.recut(wide, outer, inner);
-                let likelihood = first.elsewhere(&scene).likelihood(settings)?;
-                tried.push((likelihood, Corners { per_span, before }, scene));
-            }
-        }
-    }
-    let (_, corners, scene) = tried.into_iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
-    let gained = evidence.elsewhere(&scene).likelihood(settings)? - evidence.likelihood(settings)?;
-    (gained > CLEARLY).then_some((corners, scene))
+/// The declared scene with its walls cut at sampled points, a few ways: what another program may make of the same
+/// declaration.
+pub fn other_cuts(scene: &Scene, model: &Model) -> Vec<Scene> {
+    const FEW: [usize; 3] = [64, 100, 200];
+    cuts(scene, model, &FEW).into_iter().map(|(_, scene)| scene).collect()
 }
 
 /// A wall cut at sampled points.
-fn cut(wall: &Wall, max_error_m: f64, per_span: usize, before: bool) -> Chain {
+fn cut(wall: &Wall, max_error_m: f64, corners: Corners) -> Chain {
+    let Corners { per_span, before } = corners;
     let points = samples(wall, per_span);
     let last = points.len() - 1;
-    let mut corners = vec![0];
+    let mut ends = vec![0];
     let mut from = 0;
     while let Some(bad) = (from + 2..=last).find(|&to| exceeds(&points[from..=to], max_error_m)) {
         from = if before { bad - 1 } else { bad };
-        corners.push(from);
+        ends.push(from);
     }
     let vertex = |&i: &usize| {
         let nearest = wall.nearest(points[i]);
@@ -84,7 +66,7 @@ fn cut(wall: &Wall, max_error_m: f64, per_span: usize, before: bool) -> Chain {
         }
     };
     Chain {
-        vertices: corners.iter().map(vertex).collect(),
+        vertices: ends.iter().map(vertex).collect(),
     }
 }
 

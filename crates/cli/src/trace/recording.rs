@@ -1,0 +1,170 @@
+//! Measured data sets on the model that they declare, and simulations of the same shape.
+
+use std::path::Path;
+
+use anyhow::{Context, Result, ensure};
+use sim::{Setting, Streams};
+use track::Lap;
+
+use crate::config::{Config, ModelFile};
+use crate::dataset::DataSet;
+use crate::interrupt;
+use crate::laps::{Measured, SampledRun};
+use crate::session::Session;
+use crate::setup::{self, Setup};
+
+/// A measured data set with the model that it declares.
+#[derive(Debug)]
+pub(crate) struct Recording {
+    pub(crate) config: Config,
+    pub(crate) setup: Setup,
+    pub(crate) measured: Measured,
+    /// The same model with walls that another program may have cut.
+    pub(super) cuts: Vec<Setup>,
+    /// Text of the world file.
+    pub(super) world: String,
+}
+
+impl Recording {
+    /// A data set, checked against the model.
+    ///
+    /// # Errors
+    /// Data of another world or controller, a run without laps, a model that cannot drive.
+    pub(super) fn new(
+        session: &Session,
+        file: &ModelFile,
+        world: Option<&Path>,
+        set: DataSet,
+    ) -> Result<Self> {
+        let config = set.declared_config(&file.config)?;
+        let source = file.world(world)?;
+        belongs(&set, &config, &source.text)?;
+        let circuit = setup::circuit(&source, config.run.gates)?;
+        let measured = Measured::on(set, circuit.clone())?;
+        measured
+            .runs
+            .iter()
+            .flat_map(SampledRun::remarks)
+            .for_each(|remark| session.remark(&remark));
+        let setup = Setup::new(&config, circuit, None)?;
+        let cuts = diagnose::other_cuts(&setup.scene, &setup.model)
+            .into_iter()
+            .map(|scene| Setup {
+                scene,
+                model: setup.model.clone(),
+            })
+            .collect();
+        Ok(Self {
+            config,
+            setup,
+            measured,
+            cuts,
+            world: source.text,
+        })
+    }
+
+    /// Laps of each run.
+    pub(super) fn shape(&self) -> Vec<usize> {
+        self.measured.runs.iter().map(|run| run.laps.len()).collect()
+    }
+
+    /// The laps, run by run.
+    pub(super) fn laps(&self) -> Vec<Vec<Lap>> {
+        self.measured.runs.iter().map(|run| run.laps.clone()).collect()
+    }
+
+    /// One simulated data set of this one's shape; `None` where a run does not complete its laps. Its runs take the values
+    /// of effects that go by run from `first_run` on.
+    pub(super) fn simulate(
+        &self,
+        setup: &Setup,
+        effects: &[Setting],
+        seeds: Seeds,
+        first_run: usize,
+    ) -> Option<Vec<Vec<Lap>>> {
+        if interrupt::check().is_err() {
+            return None;
+        }
+        let mut model = setup.model.clone();
+        model.effects.extend_from_slice(effects);
+        let run = |(run, &laps): (usize, &usize)| {
+            let world = setup.scene.world(&model, first_run + run).ok()?;
+            let streams = Streams {
+                seed: seeds.of_fit(),
+                run: run as u64,
+            };
+            let drive = sim::drive(&world, streams, laps, |_| {}).ok()?;
+            let closed: Vec<Lap> = (drive.laps.into_iter())
+                .filter(|lap| lap.missed.is_empty())
+                .collect();
+            (closed.len() == laps).then_some(closed)
+        };
+        self.shape().iter().enumerate().map(run).collect()
+    }
+}
+
+/// The seed of a session and the number of a simulated data set.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Seeds {
+    pub(super) session: u64,
+    pub(super) set: u64,
+}
+
+impl Seeds {
+    /// Data sets of a fit have seeds of their own, far from those that a user's `drive` has.
+    fn of_fit(self) -> u64 {
+        (self.session << 20) + (1 << 50) + self.set
+    }
+}
+
+/// One simulated data set of the shape of all recordings together.
+pub(super) fn simulate_all(recordings: &[Recording], effects: &[Setting], seeds: Seeds) -> Option<Vec<Vec<Lap>>> {
+    let mut first_run = 0;
+    let parts = recordings.iter().map(|recording| {
+        let first = first_run;
+        first_run += recording.measured.runs.len();
+        recording.simulate(&recording.setup, effects, seeds, first)
+    });
+    Some(parts.collect::<Option<Vec<_>>>()?.concat())
+}
+
+/// Runs that no fit has seen, on the circuit of a recording that declares the same.
+///
+/// # Errors
+/// Data of another world, controller or declaration.
+pub(super) fn held_out(recordings: &[Recording], file: &ModelFile, set: DataSet) -> Result<(usize, Vec<SampledRun>)> {
+    let config = set.declared_config(&file.config)?;
+    let shown = set.folder.display().to_string();
+    let place = recordings
+        .iter()
+        .position(|recording| recording.config == config)
+        .with_context(|| {
+            format!("{shown}: declares other settings ([declared], controller) than every --measured data set")
+        })?;
+    belongs(&set, &config, &recordings[place].world)?;
+    let circuit = recordings[place].measured.circuit.clone();
+    Ok((place, Measured::on(set, circuit)?.runs))
+}
+
+/// Refuses data that are not the model's.
+fn belongs(set: &DataSet, config: &Config, world: &str) -> Result<()> {
+    let shown = set.folder.display();
+    if let Some(controller) = set.controller {
+        ensure!(
+            controller == config.controller.kind,
+            "{shown}: driven by the {} controller, and the model's is {}; add --set controller.kind={}",
+            controller.name(),
+            config.controller.kind.name(),
+            controller.name()
+        );
+    }
+    let source = set
+        .world_source(None)
+        .with_context(|| format!("{shown}: whose world must be the model's"))?;
+    ensure!(
+        source.text == world,
+        "{shown}: driven in another world ({}) than the model's",
+        source.label
+    );
+    Ok(())
+}
