@@ -25,13 +25,13 @@ pub(crate) const EXACT: Corners = Corners {
 /// exact cut; another number of pieces would be another declaration. `model` is what the scenes are for.
 pub(crate) fn cuts(scene: &Scene, model: &Model, per_span: &[usize]) -> Vec<(Corners, Scene)> {
     let counts = scene.chains().map(|chain| chain.vertices.len());
-    let ways = per_span.iter().flat_map(|&per_span| {
-        [true, false].map(|before| Corners { per_span, before })
-    });
+    let ways = per_span
+        .iter()
+        .flat_map(|&per_span| [true, false].map(|before| Corners { per_span, before }));
     ways.filter_map(|corners| {
         let course = &scene.circuit().course;
-        let [outer, inner] = [Side::Outer, Side::Inner]
-            .map(|side| cut(course.wall(side), model.wall.max_error_m, corners));
+        let [outer, inner] =
+            [Side::Outer, Side::Inner].map(|side| cut(course.wall(side), model.wall.max_error_m, corners));
         let same = [outer.vertices.len(), inner.vertices.len()] == counts;
         same.then(|| (corners, scene.recut(model, outer, inner)))
     })
@@ -42,7 +42,10 @@ pub(crate) fn cuts(scene: &Scene, model: &Model, per_span: &[usize]) -> Vec<(Cor
 /// declaration.
 pub fn other_cuts(scene: &Scene, model: &Model) -> Vec<Scene> {
     const FEW: [usize; 3] = [64, 100, 200];
-    cuts(scene, model, &FEW).into_iter().map(|(_, scene)| scene).collect()
+    cuts(scene, model, &FEW)
+        .into_iter()
+        .map(|(_, scene)| scene)
+        .collect()
 }
 
 /// A wall cut at sampled points.

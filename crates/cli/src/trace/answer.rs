@@ -1,7 +1,9 @@
 //! What laps and the robot's logs say together.
 
 use anyhow::Result;
-use diagnose::{Answer, Atlas, Explanation, FourNumbers, LogDiagnosis, LogRow, Simulate, Verdict, diagnose_logs};
+use diagnose::{
+    Answer, Atlas, Explanation, FourNumbers, LogDiagnosis, LogRow, Simulate, Verdict, diagnose_logs,
+};
 use sim::{Vec2, WheelSpeeds};
 use track::Lap;
 

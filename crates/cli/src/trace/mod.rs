@@ -80,15 +80,16 @@ impl Trace {
             .collect::<Result<_>>()?;
         let unseen = unseen.map(|set| held_out(&recordings, file, set)).transpose()?;
         let seed = session.seed();
-        let simulate = |effects: &[Setting], set: u64| {
-            simulate_all(&recordings, effects, Seeds { session: seed, set })
-        };
+        let simulate =
+            |effects: &[Setting], set: u64| simulate_all(&recordings, effects, Seeds { session: seed, set });
         let laps: Vec<Vec<track::Lap>> = recordings.iter().flat_map(Recording::laps).collect();
         let few = laps.iter().position(|run| run.len() < 3);
         ensure!(
             few.is_none(),
             "run {} has {} whole laps after its first: at least 3 in every run are needed to trace anything",
-            runs(&recordings).nth(few.unwrap_or(0)).map_or("", |run| run.name.as_str()),
+            runs(&recordings)
+                .nth(few.unwrap_or(0))
+                .map_or("", |run| run.name.as_str()),
             laps[few.unwrap_or(0)].len()
         );
         let logged = with_logs(&recordings);
@@ -167,7 +168,12 @@ fn remarks(recordings: &[Recording]) -> Vec<String> {
         );
     }
     for run in runs(recordings).filter(|run| run.laps.len() < run.wanted) {
-        remarks.push(format!("Run {} has {} of {} laps.", run.name, run.laps.len(), run.wanted));
+        remarks.push(format!(
+            "Run {} has {} of {} laps.",
+            run.name,
+            run.laps.len(),
+            run.wanted
+        ));
     }
     remarks
 }
@@ -199,11 +205,15 @@ fn errors(
         let after = laps_of(&settings)?;
         let (held_out, after_m) = match &unseen {
             Some((at, _)) if *at != place => continue,
-            Some((_, runs)) => (runs.clone(), runs.iter().map(|run| after.distance_m(run)).collect()),
+            Some((_, runs)) => (
+                runs.clone(),
+                runs.iter().map(|run| after.distance_m(run)).collect(),
+            ),
             None => {
                 let runs = recording.measured.runs.clone();
                 let distance = |(run, at): (&SampledRun, usize)| {
-                    let without: Vec<Setting> = answer.left_out[at].iter().map(|s| slice(s, at..at + 1)).collect();
+                    let without: Vec<Setting> =
+                        answer.left_out[at].iter().map(|s| slice(s, at..at + 1)).collect();
                     if without.is_empty() {
                         return Ok(before.distance_m(run));
                     }
@@ -244,7 +254,9 @@ fn with_simulations<R>(
     use_them: impl FnOnce(&Simulate<'_>, &[&Simulate<'_>]) -> R,
 ) -> R {
     let of = |setup| {
-        move |effects: &[Setting], set: u64| recording.simulate(setup, effects, Seeds { session: seed, set }, 0)
+        move |effects: &[Setting], set: u64| {
+            recording.simulate(setup, effects, Seeds { session: seed, set }, 0)
+        }
     };
     let declared = of(&recording.setup);
     let cuts: Vec<_> = recording.cuts.iter().map(of).collect();
@@ -285,7 +297,10 @@ fn atlas(session: &Session, recording: &Recording, cache: &Cache) -> Result<Atla
     if let Some(atlas) = cache.get(&key) {
         return Ok(atlas);
     }
-    let progress = session.progress("simulating what each effect would do", Atlas::sets(recording.cuts.len()));
+    let progress = session.progress(
+        "simulating what each effect would do",
+        Atlas::sets(recording.cuts.len()),
+    );
     let atlas = with_simulations(recording, session.seed(), |declared, cuts| {
         Atlas::new(declared, cuts, &|| progress.tick(1))
     });

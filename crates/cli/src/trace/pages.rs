@@ -194,7 +194,12 @@ fn residual(trace: &Trace) -> Vec<Block> {
         }
     };
     rows(&trace.residual, "declared model");
-    if let Some(remainder) = trace.answer.explanations.first().and_then(|a| a.remainder.as_ref()) {
+    if let Some(remainder) = trace
+        .answer
+        .explanations
+        .first()
+        .and_then(|a| a.remainder.as_ref())
+    {
         rows(remainder, "with the answer");
     }
     vec![

@@ -118,7 +118,11 @@ impl Seeds {
 }
 
 /// One simulated data set of the shape of all recordings together.
-pub(super) fn simulate_all(recordings: &[Recording], effects: &[Setting], seeds: Seeds) -> Option<Vec<Vec<Lap>>> {
+pub(super) fn simulate_all(
+    recordings: &[Recording],
+    effects: &[Setting],
+    seeds: Seeds,
+) -> Option<Vec<Vec<Lap>>> {
     let mut first_run = 0;
     let parts = recordings.iter().map(|recording| {
         let first = first_run;
@@ -132,14 +136,20 @@ pub(super) fn simulate_all(recordings: &[Recording], effects: &[Setting], seeds:
 ///
 /// # Errors
 /// Data of another world, controller or declaration.
-pub(super) fn held_out(recordings: &[Recording], file: &ModelFile, set: DataSet) -> Result<(usize, Vec<SampledRun>)> {
+pub(super) fn held_out(
+    recordings: &[Recording],
+    file: &ModelFile,
+    set: DataSet,
+) -> Result<(usize, Vec<SampledRun>)> {
     let config = set.declared_config(&file.config)?;
     let shown = set.folder.display().to_string();
     let place = recordings
         .iter()
         .position(|recording| recording.config == config)
         .with_context(|| {
-            format!("{shown}: declares other settings ([declared], controller) than every --measured data set")
+            format!(
+                "{shown}: declares other settings ([declared], controller) than every --measured data set"
+            )
         })?;
     belongs(&set, &config, &recordings[place].world)?;
     let circuit = recordings[place].measured.circuit.clone();

@@ -21,9 +21,6 @@ pub type Simulate<'a> = dyn Fn(&[Setting], u64) -> Option<Vec<Vec<track::Lap>>> 
 /// Data sets simulated with the declared model.
 pub(super) const NULL_SETS: u64 = 200;
 
-/// Data sets simulated for each size of a probe.
-const PROBE_SETS: u64 = 8;
-
 /// Data sets simulated for each other way to cut the walls.
 const CUT_SETS: u64 = 16;
 
@@ -126,33 +123,29 @@ impl Atlas {
             paths: Vec::new(),
             spent: Spent::default(),
         };
-        let same_draws = Expectation::of(null[..PROBE_SETS as usize].iter(), true);
         drop(null);
-        atlas.paths = atlas.simulate_paths(simulate, &same_draws, tick);
+        atlas.paths = atlas.simulate_paths(simulate, tick);
         Ok(atlas)
     }
 
     /// The action of every probe at every size, by the same draws with and without it.
-    fn simulate_paths(
-        &self,
-        simulate: &Simulate<'_>,
-        same_draws: &Expectation,
-        tick: &(dyn Fn() + Sync),
-    ) -> Vec<Vec<Option<White>>> {
+    fn simulate_paths(&self, simulate: &Simulate<'_>, tick: &(dyn Fn() + Sync)) -> Vec<Vec<Option<White>>> {
         let jobs: Vec<(usize, usize)> = (self.probes.iter().enumerate())
             .flat_map(|(p, probe)| (0..probe.sizes.len()).map(move |k| (p, k)))
             .collect();
         let points: Vec<Option<White>> = jobs
             .par_iter()
             .map(|&(p, k)| {
-                let setting = [self.probes[p].setting(self.probes[p].sizes[k])];
-                let sets: Option<Vec<Summary>> = (0..PROBE_SETS)
+                let probe = &self.probes[p];
+                let setting = [probe.setting(probe.sizes[k])];
+                let same_draws = Expectation::mean(&self.samples[..probe.sets as usize], true);
+                let sets: Option<Vec<Summary>> = (0..probe.sets)
                     .map(|set| {
                         tick();
                         self.summary(simulate, &setting, set)
                     })
                     .collect();
-                sets.map(|sets| self.white(&Expectation::of(sets.iter(), true), same_draws))
+                sets.map(|sets| self.white(&Expectation::of(sets.iter(), true), &same_draws))
             })
             .collect();
         let mut points = points.into_iter();
@@ -167,7 +160,8 @@ impl Atlas {
         let samples = (0..NULL_SETS as usize)
             .map(|set| Expectation::join(parts.iter().map(|part| part.samples[set].clone())))
             .collect();
-        let paths = (0..probes.len()).map(|p| (0..probes[p].sizes.len()).map(|k| joined(&parts, p, k)).collect());
+        let paths =
+            (0..probes.len()).map(|p| (0..probes[p].sizes.len()).map(|k| joined(&parts, p, k)).collect());
         Some(Self {
             null: Expectation::join(parts.iter().map(|part| part.null.clone())),
             scatter: parts.iter().flat_map(|part| part.scatter.clone()).collect(),
@@ -219,8 +213,8 @@ impl Atlas {
 
     /// Number of data sets that [`Atlas::new`] simulates with so many other cuts.
     pub fn sets(cuts: usize) -> u64 {
-        let sizes: u64 = probes().iter().map(|probe| probe.sizes.len() as u64).sum();
-        Self::null_sets(cuts) + PROBE_SETS * sizes
+        let sets = |probe: &Probe| probe.sets * probe.sizes.len() as u64;
+        Self::null_sets(cuts) + probes().iter().map(sets).sum::<u64>()
     }
 
     /// Number of data sets that [`Atlas::without_effects`] simulates with so many other cuts.
@@ -247,7 +241,10 @@ impl Atlas {
     /// Whether data have the shape that the atlas was made for, run by run.
     pub(super) fn observed(&self, runs: &[Vec<track::Lap>]) -> Result<Expectation, Error> {
         let counts: Vec<usize> = self.layout.laps.iter().map(Vec::len).collect();
-        let shaped = runs.iter().map(Vec::len).eq(self.layout.laps.iter().flatten().copied());
+        let shaped = runs
+            .iter()
+            .map(Vec::len)
+            .eq(self.layout.laps.iter().flatten().copied());
         let summary = Summary::new(runs, &counts).filter(|_| shaped);
         Ok(observed(&summary.ok_or(Error::TooFewLaps)?))
     }
@@ -264,7 +261,9 @@ impl Atlas {
         let counts: Vec<usize> = counts.collect();
         let mut others = runs.to_vec();
         others.remove(run);
-        Ok(observed(&Summary::new(&others, &counts).ok_or(Error::TooFewLaps)?))
+        Ok(observed(
+            &Summary::new(&others, &counts).ok_or(Error::TooFewLaps)?,
+        ))
     }
 
     /// The summary of one simulated data set; `None` where a run crashes.
@@ -285,7 +284,10 @@ fn joined(parts: &[Atlas], probe: usize, size: usize) -> Option<White> {
         .map(|part| part.paths[probe][size].as_ref())
         .collect::<Option<_>>()?;
     let length = pieces.iter().map(|piece| piece.len()).sum();
-    Some(White::from_iterator(length, pieces.iter().flat_map(|piece| piece.iter().copied())))
+    Some(White::from_iterator(
+        length,
+        pieces.iter().flat_map(|piece| piece.iter().copied()),
+    ))
 }
 
 /// How other cuts of the walls change the mean lap, by the same draws; a cut with which the robot crashes is left out.

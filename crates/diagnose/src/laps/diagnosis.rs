@@ -1,16 +1,12 @@
 //! The answer: which effects, how sure, what else it could be.
 
-use rayon::prelude::*;
+use sim::{Setting, UNLISTED};
 
-use sim::Setting;
-
-use super::atlas::{Atlas, Simulate, White};
-use super::expectation::Expectation;
-use super::hypothesis::Hypothesis;
-use super::refine::{Descended, Refined};
-use super::screen::Screened;
+use super::atlas::{Atlas, Simulate};
+use super::screen::{FAULTS, Screened};
+use super::search::{Found, Search, sort};
 use super::tests_of_fit::FourNumbers;
-use crate::{Answer, Candidate, Error, Explanation, Verdict};
+use crate::{Answer, Cause, Error, Explanation, Verdict};
 
 /// Score of the best probe from which a data set counts as departing from the declared model, whatever the omnibus says.
 const ALARM_SCORE: f64 = 7.0;
@@ -20,21 +16,30 @@ const ALARM_P: f64 = 0.002;
 const SIGNIFICANT_P: f64 = 0.001;
 /// Share of the excess that an explanation must explain to stand in spite of a significant remainder.
 const ENOUGH: f64 = 0.98;
+/// The same for several effects, which have more freedom to be wrong.
+const ALL_BUT: f64 = 0.995;
+/// Share that several effects, or one without a name, must explain to be claimed in part.
+const MOST: f64 = 0.9;
+/// A cause without a name that explains as much as named ones but for this share comes first.
+const AS_GOOD: f64 = 0.01;
 /// Hypotheses within this log-likelihood of the best are reported as alternatives.
 const ALTERNATIVE: f64 = 5.0;
 /// Log-likelihood that each number of a further effect must gain.
 const WORTH: f64 = 10.0;
 
-/// An explanation and what simulates it.
-#[derive(Debug, Clone)]
-struct Found {
-    hypothesis: Hypothesis,
-    explanation: Explanation,
+/// Whether an explanation leaves nothing significant.
+fn fits(explanation: &Explanation) -> bool {
+    explanation.remainder_p >= SIGNIFICANT_P
 }
 
 /// Whether an explanation leaves nothing significant, or next to nothing.
 fn suffices(explanation: &Explanation) -> bool {
-    explanation.remainder_p >= SIGNIFICANT_P || explanation.share >= ENOUGH
+    let enough = if explanation.effects.len() > 1 {
+        ALL_BUT
+    } else {
+        ENOUGH
+    };
+    fits(explanation) || explanation.share >= enough
 }
 
 /// What laps tell about a model.
@@ -69,28 +74,13 @@ impl Atlas {
             data: &data,
             residual: &residual,
         };
-        let mut found = search.singles(&screened);
-        if found
-            .first()
-            .is_none_or(|best| best.explanation.remainder_p < SIGNIFICANT_P)
-        {
-            let pairs = search.pairs();
-            found = search.weigh(found, pairs);
-        }
-        let verdict = match found.first().map(|best| &best.explanation) {
-            Some(best) if suffices(best) => Verdict::Explained,
-            Some(best) if best.share >= 0.8 => Verdict::PartlyExplained,
-            _ => Verdict::Unexplained,
-        };
-        let indistinguishable = found.first().map_or(0, |best| {
-            found
-                .iter()
-                .map(|f| &f.explanation)
-                .take_while(|e| {
-                    e.score > best.explanation.score - ALTERNATIVE
-                        && e.effects.len() == best.explanation.effects.len()
-                })
-                .count()
+        let found = explain(&search, &screened);
+        let best = found.first().map(|best| &best.explanation);
+        let verdict = best.map_or(Verdict::Unexplained, verdict_of);
+        let indistinguishable = best.map_or(0, |best| {
+            let alike =
+                |e: &Explanation| e.score > best.score - ALTERNATIVE && e.effects.len() == best.effects.len();
+            found.iter().take_while(|f| alike(&f.explanation)).count()
         });
         let answer = found.first().filter(|_| verdict != Verdict::Unexplained);
         let left_out = match answer {
@@ -98,6 +88,7 @@ impl Atlas {
             Some(answer) => vec![answer.explanation.settings(); runs.len()],
             None => vec![Vec::new(); runs.len()],
         };
+        let cause = answer.and_then(|answer| Cause::of(&answer.explanation.effects[0].setting));
         Ok(LapDiagnosis {
             residual: numbers,
             answer: Answer {
@@ -105,10 +96,90 @@ impl Atlas {
                 explanations: found.into_iter().map(|f| f.explanation).collect(),
                 indistinguishable,
                 left_out,
-                cause: None,
+                cause,
             },
         })
     }
+}
+
+/// Every explanation that was tried to the end, the answer first.
+fn explain(search: &Search<'_>, screened: &[Screened]) -> Vec<Found> {
+    let mut found = search.singles(screened);
+    if !first_is(&found, suffices) {
+        found.extend(search.scans());
+        sort(&mut found);
+    }
+    if !first_is(&found, fits) {
+        found = preferred(found, search.pairs());
+    }
+    if !first_is(&found, suffices) {
+        let further = search.further(&found);
+        found = preferred(found, further);
+    }
+    if !first_is(&found, suffices) {
+        found = unless_named(found, search.unnamed());
+    }
+    found
+}
+
+fn first_is(found: &[Found], holds: fn(&Explanation) -> bool) -> bool {
+    found.first().is_some_and(|best| holds(&best.explanation))
+}
+
+/// What is claimed of the best explanation.
+fn verdict_of(best: &Explanation) -> Verdict {
+    if only_noise(best) && best.effects.len() > 1 {
+        return Verdict::Unexplained;
+    }
+    if suffices(best) {
+        return Verdict::Explained;
+    }
+    let unnamed = best.effects.iter().any(|e| *e.setting.spec == UNLISTED);
+    let enough = if unnamed || best.effects.len() > 1 {
+        MOST
+    } else {
+        ENOUGH
+    };
+    if best.share >= enough {
+        Verdict::PartlyExplained
+    } else {
+        Verdict::Unexplained
+    }
+}
+
+/// Whether an explanation changes nothing but noise. Two such effects are more likely one that has no name.
+fn only_noise(explanation: &Explanation) -> bool {
+    const NOISE: [&str; 4] = ["slip-level", "slip-memory", "reading-noise", "camera-noise"];
+    explanation.names().iter().all(|name| NOISE.contains(name))
+}
+
+/// More effects come before fewer only if each number of the further ones gains enough, and if they fit where the fewer do
+/// not or explain more of what the fewer leave.
+fn preferred(fewer: Vec<Found>, more: Vec<Found>) -> Vec<Found> {
+    let (Some(first), Some(further)) = (fewer.first(), more.first()) else {
+        return if fewer.is_empty() { more } else { fewer };
+    };
+    let count = |f: &Found| f.explanation.effects.iter().map(|c| c.fitted).sum::<usize>();
+    let (a, b) = (&first.explanation, &further.explanation);
+    let numbers = count(further).saturating_sub(count(first)).max(1) as f64;
+    let better = fits(b) || b.share >= ALL_BUT || !suffices(a) && b.share > a.share;
+    let wins = b.gain - a.gain > (WORTH * numbers).max(FAULTS * a.gain) && better && !only_noise(b);
+    let (mut list, rest) = if wins { (more, fewer) } else { (fewer, more) };
+    list.extend(rest);
+    list
+}
+
+/// A cause without a name comes before names that explain no more than it. Where causes in different stages explain the
+/// same, none is claimed.
+fn unless_named(named: Vec<Found>, unnamed: Vec<Found>) -> Vec<Found> {
+    let Some(best) = unnamed.first() else {
+        return named;
+    };
+    let share = named.first().map_or(0.0, |first| first.explanation.share);
+    let wins = suffices(&best.explanation) || best.explanation.share > share - AS_GOOD;
+    let (mut list, rest) = if wins { (unnamed, named) } else { (named, unnamed) };
+    list.extend(rest);
+    list
 }
 
 impl Atlas {
@@ -129,119 +200,9 @@ impl Atlas {
             return Ok((before, Some(before)));
         }
         let after = self.remainder(simulate, &data, effects);
-        Ok((before, after.map(|residual| FourNumbers::new(&residual, &self.layout))))
+        Ok((
+            before,
+            after.map(|residual| FourNumbers::new(&residual, &self.layout)),
+        ))
     }
-}
-
-/// A search for explanations of one data set.
-struct Search<'a> {
-    atlas: &'a Atlas,
-    simulate: &'a Simulate<'a>,
-    data: &'a Expectation,
-    residual: &'a White,
-}
-
-impl Search<'_> {
-    /// The best single effects, tried to the end.
-    fn singles(&self, screened: &[Screened]) -> Vec<Found> {
-        self.try_all(shortlist(screened).iter().map(|s| &s.hypothesis))
-    }
-
-    /// The best pairs, tried to the end.
-    fn pairs(&self) -> Vec<Found> {
-        const PAIRS: usize = 6;
-        let pairs = self.atlas.screen_pairs(self.residual, PAIRS);
-        self.try_all(pairs.iter().map(|pair| &pair.hypothesis))
-    }
-
-    /// Descends from every hypothesis, then settles those that may still be the best.
-    fn try_all<'h>(&self, hypotheses: impl Iterator<Item = &'h Hypothesis>) -> Vec<Found> {
-        const ROUNDS: usize = 3;
-        // What lies this far behind after its descent does not come back.
-        const BEHIND: f64 = 25.0;
-        let all: Vec<&Hypothesis> = hypotheses.collect();
-        let descended: Vec<Descended> = all
-            .par_iter()
-            .filter_map(|start| self.atlas.descend(self.simulate, self.data, start, ROUNDS))
-            .collect();
-        let best = descended
-            .iter()
-            .map(|d| d.score)
-            .fold(f64::NEG_INFINITY, f64::max);
-        let mut explanations: Vec<Found> = descended
-            .par_iter()
-            .filter(|d| d.score >= best - BEHIND.max(0.02 * best))
-            .filter_map(|d| self.atlas.settle(self.simulate, self.data, d))
-            .map(|refined| self.explanation(&refined))
-            .collect();
-        explanations.sort_by(|a, b| b.explanation.score.total_cmp(&a.explanation.score));
-        explanations
-    }
-
-    /// Singles and pairs in order of what they are worth: a pair comes before a single effect only if each number of its
-    /// further effect gains enough and it fits where the single does not.
-    fn weigh(&self, singles: Vec<Found>, pairs: Vec<Found>) -> Vec<Found> {
-        let (Some(single), Some(pair)) = (singles.first(), pairs.first()) else {
-            return if singles.is_empty() { pairs } else { singles };
-        };
-        let count = |f: &Found| f.explanation.effects.iter().map(|c| c.fitted).sum::<usize>();
-        let further = count(pair).saturating_sub(count(single)).max(1) as f64;
-        let wins = pair.explanation.gain - single.explanation.gain > WORTH * further && suffices(&pair.explanation);
-        let (mut first, second) = if wins { (pairs, singles) } else { (singles, pairs) };
-        first.extend(second);
-        first
-    }
-
-    fn explanation(&self, refined: &Refined) -> Found {
-        let atlas = self.atlas;
-        let settings = refined.hypothesis.settings(atlas);
-        let effects = settings
-            .into_iter()
-            .enumerate()
-            .map(|(part, setting)| {
-                let errors: Vec<f64> = refined.errors_of(part, atlas);
-                let fitted = errors.iter().filter(|e| **e > 0.0).count();
-                Candidate {
-                    setting,
-                    standard_errors: errors,
-                    gain: refined.gain,
-                    fitted,
-                }
-            })
-            .collect();
-        let excess = |squares: f64| squares - self.residual.len() as f64;
-        let remainder = FourNumbers::new(&refined.residual, &atlas.layout);
-        Found {
-            hypothesis: refined.hypothesis.clone(),
-            explanation: Explanation {
-                effects,
-                score: refined.score,
-                gain: refined.gain,
-                share: 1.0 - excess(refined.residual.norm_squared()) / excess(self.residual.norm_squared()),
-                remainder_p: remainder.omnibus_p(),
-                remainder: Some(remainder),
-            },
-        }
-    }
-}
-
-/// The screened hypotheses worth a simulation: each probe in its best pattern.
-fn shortlist(screened: &[Screened]) -> Vec<&Screened> {
-    const MOST: usize = 7;
-    let Some(best) = screened.first() else {
-        return Vec::new();
-    };
-    let mut list: Vec<&Screened> = Vec::new();
-    for candidate in screened {
-        let probe = candidate.hypothesis.parts[0].probe;
-        let seen = list.iter().any(|s| s.hypothesis.parts[0].probe == probe);
-        let hopeless = candidate.score < 0.7 * best.score - 20.0;
-        if list.len() == MOST || hopeless {
-            break;
-        }
-        if !seen {
-            list.push(candidate);
-        }
-    }
-    list
 }

@@ -34,7 +34,9 @@ impl Expectation {
     pub(super) fn mean(all: &[Self], alike: bool) -> Self {
         let share = 1.0 / all.len() as f64;
         let zero = all[0].moved(-1.0, &all[0].zero(), &all[0]);
-        let mut mean = all.iter().fold(zero, |mean, one| mean.moved(share, &one.zero(), one));
+        let mut mean = all
+            .iter()
+            .fold(zero, |mean, one| mean.moved(share, &one.zero(), one));
         if alike {
             mean.0.iter_mut().for_each(Expected::pool);
         }

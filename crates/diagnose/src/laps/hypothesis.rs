@@ -4,7 +4,7 @@ use sim::{Pattern, Setting};
 
 use super::atlas::Atlas;
 use super::probe::Probe;
-use super::screen::worth;
+use super::screen::{at, worth};
 
 /// How an effect goes over the runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -26,6 +26,8 @@ pub(super) struct Part {
     pub(super) values: Vec<Vec<f64>>,
     /// Change of the sized parameter per second, where it changes.
     pub(super) per_s: f64,
+    /// Factor on the steps of the probe's free numbers.
+    pub(super) stride: f64,
 }
 
 /// Effects that act together.
@@ -69,12 +71,14 @@ impl Part {
                 shape,
                 values: vec![clamped(sizes[0])],
                 per_s: 0.0,
+                stride: 1.0,
             },
             Shape::ByRun => Self {
                 probe,
                 shape,
                 values: sizes.iter().map(|&s| clamped(s)).collect(),
                 per_s: 0.0,
+                stride: 1.0,
             },
             Shape::ByTime => {
                 let per_s = sizes[1] / atlas.lap_s();
@@ -85,8 +89,25 @@ impl Part {
                     shape,
                     values: vec![clamped(sizes[0] - per_s * middle_s)],
                     per_s,
+                    stride: 1.0,
                 }
             }
+        }
+    }
+
+    /// A group of basis functions at multiples of its steps.
+    pub(super) fn group(probe: &Probe, number: usize, multiples: &[f64]) -> Self {
+        let mut values = probe.origin().to_vec();
+        for (&(parameter, step), multiple) in probe.free.iter().zip(multiples) {
+            values[parameter] += step * multiple;
+        }
+        let largest = multiples.iter().fold(0.0_f64, |most, m| most.max(m.abs()));
+        Self {
+            probe: number,
+            shape: Shape::Constant,
+            values: vec![values],
+            per_s: 0.0,
+            stride: (0.3 * largest).max(1.0),
         }
     }
 
@@ -131,6 +152,7 @@ impl Part {
         let runs = self.values.len();
         let mut freedoms = Vec::new();
         for (i, &(parameter, step)) in probe.free.iter().enumerate() {
+            let step = step * self.stride;
             let parameter = Some(parameter);
             if i == 0 && self.shape == Shape::ByRun {
                 freedoms.extend((0..runs).map(|run| Freedom {
@@ -173,6 +195,26 @@ impl Hypothesis {
     /// Whether all runs are alike.
     pub(super) fn alike(&self) -> bool {
         self.parts.iter().all(|part| part.shape != Shape::ByRun)
+    }
+
+    /// This hypothesis and another together.
+    pub(super) fn with(&self, other: &Self) -> Self {
+        Self {
+            parts: self.parts.iter().chain(&other.parts).cloned().collect(),
+        }
+    }
+
+    /// How much a part does, for an order of importance: its squared action along its path.
+    pub(super) fn weight(&self, part: usize, atlas: &Atlas) -> f64 {
+        let part = &self.parts[part];
+        let nodes = atlas.nodes(part.probe);
+        let size = atlas.probes[part.probe].free[0].0;
+        let count = part.values.len() as f64;
+        let mean = part.values.iter().map(|values| values[size]).sum::<f64>() / count;
+        if nodes.len() < 2 {
+            return f64::INFINITY;
+        }
+        at(&nodes, mean).norm_squared()
     }
 
     /// What counts of a gain in log-likelihood.
@@ -218,13 +260,14 @@ impl Hypothesis {
         let mut moved = self.clone();
         for (freedom, by) in moves {
             let part = &mut moved.parts[freedom.part];
-            let params = atlas.probes[part.probe].spec.params;
+            let spec = atlas.probes[part.probe].spec;
             match freedom.parameter {
                 None => part.per_s += by,
                 Some(i) => {
                     let runs = freedom.run.map_or(0..part.values.len(), |run| run..run + 1);
                     for values in &mut part.values[runs] {
-                        values[i] = within(values[i] + by, &params[i]);
+                        let param = spec.params.get(i).or(spec.list.as_ref());
+                        values[i] = param.map_or(values[i] + by, |param| within(values[i] + by, param));
                     }
                 }
             }

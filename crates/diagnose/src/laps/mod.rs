@@ -3,12 +3,14 @@
 mod atlas;
 mod diagnosis;
 mod expectation;
+mod groups;
 mod hypothesis;
 mod layout;
 mod pairs;
 mod probe;
 mod refine;
 mod screen;
+mod search;
 mod summary;
 mod tests_of_fit;
 

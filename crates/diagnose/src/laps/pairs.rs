@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::atlas::{Atlas, White};
 use super::hypothesis::{Hypothesis, Part, Shape};
-use super::screen::price;
+use super::screen::{BEYOND, price};
 
 /// A straight piece of a probe's path.
 struct Piece {
@@ -77,8 +77,27 @@ impl Atlas {
             })
             .collect();
         pairs.sort_by(|a, b| b.score.total_cmp(&a.score));
-        pairs.truncate(most);
-        pairs
+        self.diverse(pairs, most)
+    }
+
+    /// The best pairs, of the same two effects at most two.
+    fn diverse(&self, sorted: Vec<ScreenedPair>, most: usize) -> Vec<ScreenedPair> {
+        const ALIKE: usize = 2;
+        let names = |pair: &ScreenedPair| -> Vec<&str> {
+            pair.hypothesis
+                .parts
+                .iter()
+                .map(|part| self.probes[part.probe].spec.name)
+                .collect()
+        };
+        let mut kept: Vec<ScreenedPair> = Vec::new();
+        for pair in sorted {
+            let alike = kept.iter().filter(|other| names(other) == names(&pair)).count();
+            if kept.len() < most && alike < ALIKE {
+                kept.push(pair);
+            }
+        }
+        kept
     }
 
     fn pieces(&self, probe: usize) -> Vec<Piece> {
@@ -88,8 +107,8 @@ impl Atlas {
             probe,
             from_size: pair[0].0,
             to_size: pair[1].0,
-            low: if i == 0 { -0.5 } else { 0.0 },
-            high: if i == last { 1.5 } else { 1.0 },
+            low: if i == 0 { -BEYOND } else { 0.0 },
+            high: if i == last { 1.0 + BEYOND } else { 1.0 },
             from: pair[0].1.clone(),
             along: &pair[1].1 - &pair[0].1,
         };

@@ -2,6 +2,8 @@
 
 use sim::{Pattern, Setting, Spec, find};
 
+use super::groups::groups;
+
 /// One way in which one effect may act: a line through its parameters, from the neutral values outwards.
 #[derive(Debug, Clone)]
 pub(super) struct Probe {
@@ -20,9 +22,48 @@ pub(super) struct Probe {
     pub(super) odd: bool,
     /// The size comes in whole multiples of this.
     pub(super) quantum: Option<f64>,
+    /// Whether its action jumps with its size.
+    pub(super) jumps: bool,
+    /// Data sets simulated beforehand for each size.
+    pub(super) sets: u64,
 }
 
+/// Data sets simulated beforehand for each size of a probe.
+pub(super) const PROBE_SETS: u64 = 6;
+
+/// The same where there are many places of one effect.
+const PLACE_SETS: u64 = 5;
+
 impl Probe {
+    /// Numbers to fit without a path: a group of basis functions.
+    pub(super) fn group(spec: &'static Spec, origin: Vec<f64>, free: Vec<(usize, f64)>) -> Self {
+        Self {
+            spec,
+            direction: vec![0.0; origin.len()],
+            origin,
+            sizes: Vec::new(),
+            neutral: 0.0,
+            free,
+            odd: false,
+            quantum: None,
+            jumps: false,
+            sets: PROBE_SETS,
+        }
+    }
+
+    /// The effect with one of its free numbers at its step, all others at the origin.
+    pub(super) fn step(&self, number: usize) -> Setting {
+        let (parameter, step) = self.free[number];
+        let mut values = self.origin.clone();
+        values[parameter] += step;
+        Setting::constant(self.spec, values)
+    }
+
+    /// The values where nothing is done.
+    pub(super) fn origin(&self) -> &[f64] {
+        &self.origin
+    }
+
     /// The values of all parameters at a size.
     pub(super) fn values(&self, size: f64) -> Vec<f64> {
         self.origin
@@ -66,6 +107,9 @@ impl Probe {
         }
     }
 }
+
+/// Effects whose action jumps with their size.
+const JUMPS: [&str; 3] = ["speed-step", "dead-band", "reading-step"];
 
 /// Sizes of the first parameter of an effect.
 fn line(name: &str, sizes: &[f64]) -> Vec<Probe> {
@@ -112,6 +156,8 @@ fn probe(name: &str, fixed: &[(&str, f64)], sizes: &[f64], free: &[(&str, f64)])
         free,
         odd: false,
         quantum: None,
+        jumps: JUMPS.contains(&name),
+        sets: PROBE_SETS,
     }]
 }
 
@@ -140,6 +186,11 @@ fn vector(name: &str, keys: [&str; 2], sizes: &[f64]) -> Vec<Probe> {
     probes
 }
 
+/// Probes of which one size stands for the opposite one too.
+fn mirrored(probes: Vec<Probe>) -> Vec<Probe> {
+    probes.into_iter().map(|p| Probe { odd: true, ..p }).collect()
+}
+
 /// A size with a direction, in eight of them; both are fitted.
 fn directed(name: &str, sizes: &[f64]) -> Vec<Probe> {
     let azimuths = (0..8).map(|k| f64::from(k) * std::f64::consts::FRAC_PI_4 - std::f64::consts::PI);
@@ -165,11 +216,11 @@ fn places(name: &str, length_m: f64, size: f64) -> Vec<Probe> {
             let position = (f64::from(k) + 0.5) / f64::from(PLACES);
             let fixed = [("wall", wall), ("position", position), ("length_m", length_m)];
             let free = [("position", 0.008), ("length_m", 0.015)];
-            probes.extend(
-                probe(name, &fixed, &[size], &free)
-                    .into_iter()
-                    .map(|p| Probe { odd: true, ..p }),
-            );
+            let few = |p| Probe {
+                sets: PLACE_SETS,
+                ..p
+            };
+            probes.extend(mirrored(probe(name, &fixed, &[size], &free)).into_iter().map(few));
         }
     }
     probes
@@ -193,7 +244,7 @@ pub(super) fn probes() -> Vec<Probe> {
         line("ambient-offset", &[-40.0, -15.0, 15.0, 40.0, 90.0]),
         line("sensor-rotation", &[-0.12, -0.06, -0.02, 0.02, 0.06, 0.12]),
         line("sensor-reach", &[0.7, 0.8, 0.88, 0.95, 1.06, 1.2]),
-        sensors("one-sensor-gain", &[0.6, 0.8, 0.92, 1.1, 1.3, 1.6]),
+        sensors("one-sensor-gain", &[0.65, 0.86, 1.16, 1.5]),
         sensors("one-sensor-offset", &[-60.0, -20.0, 20.0, 60.0]),
         directed("directional-light", &[8.0, 25.0]),
         line("crosstalk", &[0.02, 0.06, 0.12, 0.2]),
@@ -230,20 +281,17 @@ pub(super) fn probes() -> Vec<Probe> {
             "inner-wall-offset",
             &[-0.012, -0.005, -0.0015, 0.0015, 0.005, 0.012],
         ),
-        places("wall-bump", 0.06, 0.008),
+        places("wall-bump", 0.06, 0.012),
         line("outer-wall-reflectance", &[0.65, 0.85, 1.15, 1.45]),
         line("inner-wall-reflectance", &[0.65, 0.85, 1.15, 1.45]),
-        places("reflectance-patch", 0.09, 1.4),
-        line("camera-scale", &[0.985, 0.995, 1.005, 1.015]),
-        vector("camera-offset", ["dx_m", "dy_m"], &[-0.003, -0.001, 0.001, 0.003]),
-        line("camera-rotation", &[-0.012, -0.004, 0.004, 0.012]),
-        line("camera-distortion", &[-0.015, -0.005, 0.005, 0.015]),
-        vector(
-            "marker-offset",
-            ["forward_m", "left_m"],
-            &[-0.004, -0.0015, 0.0015, 0.004],
-        ),
+        places("reflectance-patch", 0.09, 1.5),
+        mirrored(line("camera-scale", &[1.008])),
+        mirrored(vector("camera-offset", ["dx_m", "dy_m"], &[0.002])),
+        mirrored(line("camera-rotation", &[0.008])),
+        mirrored(line("camera-distortion", &[0.01])),
+        mirrored(vector("marker-offset", ["forward_m", "left_m"], &[0.003])),
         line("camera-noise", &[0.4, 0.75, 1.4, 2.0, 3.0]),
+        groups(),
     ]
     .concat()
 }

@@ -6,7 +6,7 @@ use sim::{Pattern, Setting};
 
 use super::atlas::{Atlas, Simulate, White, white};
 use super::expectation::{Expectation, Scatter};
-use super::hypothesis::{Freedom, Hypothesis};
+use super::hypothesis::{Freedom, Hypothesis, Part, Shape};
 use super::layout::Layout;
 use super::screen::price;
 use super::summary::Summary;
@@ -49,54 +49,77 @@ struct Evaluated {
 
 /// A hypothesis on its way to its most likely sizes.
 #[derive(Debug, Clone)]
-pub(super) struct Descended {
+pub(super) struct Descent {
     pub(super) hypothesis: Hypothesis,
-    errors: Vec<(Freedom, f64)>,
+    freedoms: Vec<Freedom>,
+    errors: Vec<f64>,
     /// Log-likelihood gained over the declared model less the price of the fitted numbers, as the last round saw it.
     pub(super) score: f64,
+    /// Whether the last round moved nothing by more than half its error.
+    settled: bool,
+}
+
+impl Descent {
+    /// A hypothesis before its first round.
+    pub(super) fn start(atlas: &Atlas, hypothesis: &Hypothesis) -> Self {
+        let freedoms = hypothesis.freedoms(atlas);
+        Self {
+            hypothesis: hypothesis.clone(),
+            errors: vec![f64::INFINITY; freedoms.len()],
+            freedoms,
+            score: f64::NEG_INFINITY,
+            settled: false,
+        }
+    }
+
+    fn errors(&self) -> Vec<(Freedom, f64)> {
+        self.freedoms
+            .iter()
+            .copied()
+            .zip(self.errors.iter().copied())
+            .collect()
+    }
 }
 
 impl Atlas {
-    /// The best sizes of a hypothesis, starting from those it has; `None` where the robot then crashes.
+    /// One round towards the best sizes; `None` where the robot then crashes.
     ///
-    /// Each round simulates the hypothesis at its sizes and a step to either side of each, with the same draws, takes the
+    /// A round simulates the hypothesis at its sizes and a step to either side of each, with the same draws, takes the
     /// means for parabolas in each number, and goes to where these are nearest to the data.
     pub(super) fn descend(
         &self,
         simulate: &Simulate<'_>,
         data: &Expectation,
-        start: &Hypothesis,
-        rounds: usize,
-    ) -> Option<Descended> {
-        let mut hypothesis = start.clone();
-        let mut freedoms = hypothesis.freedoms(self);
-        let mut errors = vec![f64::INFINITY; freedoms.len()];
-        let mut score = f64::NEG_INFINITY;
-        for _ in 0..rounds {
-            let local = self.local(simulate, &hypothesis, &freedoms)?;
-            let target = white(&local.scatter, &self.layout, data, &local.center);
-            let (moves, covariance) = nearest(&local.columns, &target, &freedoms);
-            let left = left_of(&local.columns, &target, &moves).norm_squared() / (1.0 + local.error);
-            score =
-                self.gain(data, left, &local.scatter) - price(freedoms.len(), self.layout.total_laps());
-            let settled = (0..moves.len()).all(|i| moves[i].abs() < 0.5 * covariance[(i, i)].sqrt());
-            let by: Vec<(Freedom, f64)> = freedoms.iter().copied().zip(moves.iter().copied()).collect();
-            hypothesis = hypothesis.moved(self, &by);
-            for (i, freedom) in freedoms.iter_mut().enumerate() {
-                errors[i] = (covariance[(i, i)] * (1.0 + local.error)).sqrt();
-                // The parabola should hold where the answer may lie.
-                let reach = (3.0 * errors[i]).max(moves[i].abs());
-                freedom.step = reach.clamp(0.2 * freedom.step, freedom.step);
-            }
-            if settled {
-                break;
-            }
+        mut descent: Descent,
+    ) -> Option<Descent> {
+        if descent.settled {
+            return Some(descent);
         }
-        let errors = freedoms.into_iter().zip(errors).collect();
-        Some(Descended {
-            hypothesis: self.quantised(hypothesis),
+        let Descent {
+            hypothesis,
+            freedoms,
             errors,
+            ..
+        } = &mut descent;
+        let local = self.local(simulate, hypothesis, freedoms)?;
+        let target = white(&local.scatter, &self.layout, data, &local.center);
+        let (moves, covariance) = nearest(&local.columns, &target, freedoms);
+        let left = left_of(&local.columns, &target, &moves).norm_squared() / (1.0 + local.error);
+        let gain = self.gain(data, left, &local.scatter);
+        let score = hypothesis.worth(gain) - price(freedoms.len(), self.layout.total_laps());
+        let settled = (0..moves.len()).all(|i| moves[i].abs() < 0.5 * covariance[(i, i)].sqrt());
+        let by: Vec<(Freedom, f64)> = freedoms.iter().copied().zip(moves.iter().copied()).collect();
+        *hypothesis = hypothesis.moved(self, &by);
+        for (i, freedom) in freedoms.iter_mut().enumerate() {
+            errors[i] = (covariance[(i, i)] * (1.0 + local.error)).sqrt();
+            // The parabola should hold where the answer may lie.
+            let reach = (3.0 * errors[i]).max(moves[i].abs());
+            freedom.step = reach.clamp(0.2 * freedom.step, freedom.step);
+        }
+        Some(Descent {
             score,
+            settled,
+            ..descent
         })
     }
 
@@ -162,10 +185,11 @@ impl Atlas {
         &self,
         simulate: &Simulate<'_>,
         data: &Expectation,
-        found: &Descended,
+        found: &Descent,
     ) -> Option<Refined> {
-        let end = self.evaluate(simulate, &found.hypothesis, FINAL_SETS)?;
-        self.judge(data, found.hypothesis.clone(), found.errors.clone(), &end)
+        let hypothesis = self.quantised(found.hypothesis.clone());
+        let end = self.evaluate(simulate, &hypothesis, FINAL_SETS)?;
+        self.judge(data, hypothesis, found.errors(), &end)
     }
 
     /// Log-likelihood gained over the declared model by a hypothesis that leaves a squared distance of `left` in units of its own
@@ -221,6 +245,110 @@ impl Atlas {
             gain,
             score,
         })
+    }
+
+    /// What a hypothesis leaves of the data, in units of the declared model's scatter; `None` where the robot crashes.
+    pub(super) fn left_by(
+        &self,
+        simulate: &Simulate<'_>,
+        data: &Expectation,
+        hypothesis: &Hypothesis,
+    ) -> Option<White> {
+        let evaluated = self.evaluate(simulate, hypothesis, FINAL_SETS)?;
+        Some(self.white(data, &evaluated.expectation))
+    }
+
+    /// What one step of each of these numbers of probes does, by the same draws; `None` where the robot crashes.
+    pub(super) fn actions(
+        &self,
+        simulate: &Simulate<'_>,
+        numbers: &[(usize, usize)],
+        sets: u64,
+    ) -> Vec<Option<White>> {
+        let same_draws = Expectation::mean(&self.samples[..sets as usize], true);
+        numbers
+            .par_iter()
+            .map(|&(probe, number)| {
+                let setting = [self.probes[probe].step(number)];
+                let found = self.simulated_plainly(simulate, &setting, sets)?;
+                Some(self.white(&found, &same_draws))
+            })
+            .collect()
+    }
+
+    fn simulated_plainly(
+        &self,
+        simulate: &Simulate<'_>,
+        settings: &[Setting],
+        sets: u64,
+    ) -> Option<Expectation> {
+        self.spent.add(sets);
+        let summaries: Vec<Summary> = (0..sets)
+            .map(|set| self.summary(simulate, settings, set))
+            .collect::<Option<_>>()?;
+        Some(Expectation::of(summaries.iter(), true))
+    }
+
+    /// The size of an effect that jumps, by trying many: all over the probe's range, then ever closer about the best. `None`
+    /// where no size explains a fair share.
+    pub(super) fn hunt(&self, simulate: &Simulate<'_>, data: &Expectation, probe: usize) -> Option<Descent> {
+        const COARSE: usize = 60;
+        const COARSE_SETS: u64 = 2;
+        const CLOSER: [u64; 3] = [4, 8, 12];
+        const FAIR_SHARE: f64 = 0.25;
+        let p = &self.probes[probe];
+        let (low, high) = (p.sizes[0], p.sizes[p.sizes.len() - 1]);
+        // Sizes in a constant ratio: what matters is how many steps fit into a speed or a reading.
+        let ratio = (high / low).powf(1.0 / (COARSE - 1) as f64);
+        let sizes: Vec<f64> = (0..COARSE).map(|i| low * ratio.powi(i as i32)).collect();
+        let (left, mut best) = least(&self.distances(simulate, data, probe, &sizes, COARSE_SETS))?;
+        if left > (1.0 - FAIR_SHARE) * self.white(data, &self.null).norm_squared() {
+            return None;
+        }
+        let mut spacing = best * (ratio - 1.0);
+        let mut last = Vec::new();
+        for sets in CLOSER {
+            let sizes: Vec<f64> = (-4..=4).map(|i| best + spacing * f64::from(i) / 3.0).collect();
+            last = self.distances(simulate, data, probe, &sizes, sets);
+            best = least(&last)?.1;
+            spacing /= 3.0;
+        }
+        // Sizes that are no worse than by 4 in squared distance bound the answer.
+        let bound = least(&last)?.0 + 4.0;
+        let as_good = last
+            .iter()
+            .filter(|found| found.0 < bound)
+            .map(|found| (found.1 - best).abs());
+        let error = as_good.fold(spacing / 2.0, f64::max);
+        let hypothesis = Hypothesis {
+            parts: vec![Part::screened(self, probe, Shape::Constant, &[best])],
+        };
+        let start = Descent::start(self, &hypothesis);
+        Some(Descent {
+            errors: vec![error; start.freedoms.len()],
+            settled: true,
+            ..start
+        })
+    }
+
+    /// Squared distances of the data from a probe at some sizes, each with its size; sizes at which the robot crashes are
+    /// left out.
+    fn distances(
+        &self,
+        simulate: &Simulate<'_>,
+        data: &Expectation,
+        probe: usize,
+        sizes: &[f64],
+        sets: u64,
+    ) -> Vec<(f64, f64)> {
+        let same_draws = Expectation::mean(&self.samples[..sets as usize], true);
+        let distance = |&size: &f64| {
+            let settings = [self.probes[probe].setting(size)];
+            let found = self.simulated_plainly(simulate, &settings, sets)?;
+            let expected = found.moved(1.0, &same_draws, &self.null);
+            Some((self.white(data, &expected).norm_squared(), size))
+        };
+        sizes.par_iter().filter_map(distance).collect()
     }
 
     /// What effects leave of the data, in units of their own scatter; `None` where the robot crashes.
@@ -313,6 +441,11 @@ impl Atlas {
             columns,
         })
     }
+}
+
+/// The least of some distances, with its size.
+fn least(found: &[(f64, f64)]) -> Option<(f64, f64)> {
+    found.iter().copied().min_by(|a, b| a.0.total_cmp(&b.0))
 }
 
 /// Freedoms that are moved together: the sizes of one part in its runs.

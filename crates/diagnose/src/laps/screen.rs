@@ -14,6 +14,16 @@ pub(super) struct Screened {
     pub(super) score: f64,
 }
 
+impl Screened {
+    /// Whether its size is the same always.
+    pub(super) fn is_constant(&self) -> bool {
+        self.hypothesis
+            .parts
+            .iter()
+            .all(|part| part.shape == Shape::Constant)
+    }
+}
+
 /// Half the logarithm of the number of laps for each fitted number (Schwarz 1978).
 pub(super) fn price(parameters: usize, laps: usize) -> f64 {
     0.5 * parameters as f64 * (laps as f64).ln()
@@ -130,10 +140,15 @@ impl Atlas {
     }
 }
 
+/// Share of a gain that faults of a model may take: at very high signal none is exact.
+pub(super) const FAULTS: f64 = 0.01;
+
+/// Share of its last piece by which a path is trusted to go on straight.
+pub(super) const BEYOND: f64 = 0.7;
+
 /// What counts of a gain: at very high signal no model is exact, and sizes that may go over the runs follow its faults.
 pub(super) fn worth(gain: f64, shape: Shape) -> f64 {
-    /// Share of a gain that is not trusted, and what a pattern has to gain beside its numbers.
-    const FAULTS: f64 = 0.01;
+    /// What a pattern has to gain beside its numbers.
     const PATTERN: f64 = 4.0;
     match shape {
         Shape::Constant => gain,
@@ -142,7 +157,7 @@ pub(super) fn worth(gain: f64, shape: Shape) -> f64 {
 }
 
 /// The point of a path that is nearest to the residual in some entries, and its size. Beyond its ends the path goes on
-/// straight for half its last piece.
+/// straight for [`BEYOND`] of its last piece.
 fn nearest(nodes: &[(f64, White)], residual: &White, entries: Range<usize>) -> Option<(f64, White)> {
     let (first, count) = (entries.start, entries.len());
     let target = residual.rows(first, count);
@@ -157,8 +172,8 @@ fn nearest(nodes: &[(f64, White)], residual: &White, entries: Range<usize>) -> O
         if square == 0.0 {
             continue;
         }
-        let low = if i == 0 { -0.5 } else { 0.0 };
-        let high = if i + 2 == nodes.len() { 1.5 } else { 1.0 };
+        let low = if i == 0 { -BEYOND } else { 0.0 };
+        let high = if i + 2 == nodes.len() { 1.0 + BEYOND } else { 1.0 };
         let share = ((target - from).dot(&along) / square).clamp(low, high);
         let distance = (target - from - along * share).norm_squared();
         if best.as_ref().is_none_or(|(least, ..)| distance < *least) {
@@ -169,7 +184,7 @@ fn nearest(nodes: &[(f64, White)], residual: &White, entries: Range<usize>) -> O
 }
 
 /// The path at a size, straight on beyond its ends.
-fn at(nodes: &[(f64, White)], size: f64) -> White {
+pub(super) fn at(nodes: &[(f64, White)], size: f64) -> White {
     let (from, slope) = piece(nodes, size);
     &from.1 + slope * (size - from.0)
 }

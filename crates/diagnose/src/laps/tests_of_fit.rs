@@ -1,8 +1,8 @@
 //! Four numbers that say whether, and in what, a data set departs from what was expected.
 
-use statrs::distribution::{ChiSquared, ContinuousCDF};
+use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
 
-use super::atlas::White;
+use super::atlas::{NULL_SETS, White};
 use super::layout::Layout;
 use super::summary::SECOND;
 
@@ -25,6 +25,16 @@ impl Quadratic {
             Err(_) => 1.0,
         };
         Self { q, freedom, p }
+    }
+
+    /// A sum in units of a covariance that was estimated from [`NULL_SETS`] data sets and enlarged so that the sum's expectation is
+    /// its number: Hotelling's T^2, which has heavier tails.
+    fn of_estimated(q: f64, freedom: usize) -> Self {
+        let (n, p) = (NULL_SETS as f64 - 1.0, freedom as f64);
+        let t2 = q * n / (n - p - 1.0);
+        let f = t2 * (n - p + 1.0) / (n * p);
+        let tail = FisherSnedecor::new(p, n - p + 1.0).map_or(1.0, |law| law.sf(f));
+        Self { q, freedom, p: tail }
     }
 
     /// What exceeds the expectation.
@@ -70,7 +80,7 @@ impl FourNumbers {
             mean: Quadratic::new(means, recordings * layout.lap),
             runs: Quadratic::new(all - means, (layout.runs() - recordings) * layout.lap),
             trend: Quadratic::new(each(&|g| layout.trend(g)), recordings * layout.lap),
-            noise: Quadratic::new(each(&|g| layout.second(g)), recordings * SECOND),
+            noise: Quadratic::of_estimated(each(&|g| layout.second(g)), recordings * SECOND),
         }
     }
 

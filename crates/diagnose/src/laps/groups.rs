@@ -1,0 +1,129 @@
+//! Causes without a name: groups of basis functions of what a cause may depend on.
+
+use nalgebra::{DMatrix, DVector};
+use sim::{Spec, UNLISTED};
+
+use super::atlas::{Atlas, Simulate, White};
+use super::hypothesis::{Hypothesis, Part};
+use super::probe::Probe;
+use super::screen::price;
+
+/// Values of [`UNLISTED`] before its coefficients: what it acts on, what it depends on, and the basis.
+const WORDS: usize = 3;
+
+/// Data sets simulated for each coefficient.
+const GROUP_SETS: u64 = 6;
+
+/// Groups within this share of the best explained are as good; of those the one with fewest coefficients is best.
+const AS_GOOD: f64 = 0.97;
+
+/// Every target with every dependence, as probes that have no path but only numbers to fit.
+pub(super) fn groups() -> Vec<Probe> {
+    let spec: &'static Spec = &UNLISTED;
+    let number = |i: usize, name: &str| spec.params[i].choices.iter().position(|n| *n == name);
+    let mut probes = Vec::new();
+    for (target, step) in TARGETS {
+        for (dependence, basis, scales) in DEPENDENCES {
+            let words = [number(0, target), number(1, dependence), number(2, basis)];
+            let [Some(target), Some(dependence), Some(basis)] = words else {
+                continue;
+            };
+            let mut origin = vec![target as f64, dependence as f64, basis as f64];
+            origin.resize(WORDS + scales.len(), 0.0);
+            // A constant has a name of its own: only what varies counts.
+            let first = usize::from(dependence_has_constant(basis, spec));
+            let free = (first..scales.len())
+                .map(|i| (WORDS + i, step * scales[i]))
+                .collect();
+            probes.push(Probe::group(spec, origin, free));
+        }
+    }
+    probes
+}
+
+/// Whether the first coefficient of a basis is a constant.
+fn dependence_has_constant(basis: usize, spec: &Spec) -> bool {
+    spec.params[2].choices[basis] == "polynomial"
+}
+
+/// What a cause may act on, with a step over which its action is about linear: rad/s, a share, m/s, counts, m.
+const TARGETS: [(&str, f64); 7] = [
+    ("yaw rate", 0.02),
+    ("wheel speed", 0.02),
+    ("side slip", 5e-4),
+    ("reading", 0.04),
+    ("left-right difference", 6.0),
+    ("camera x", 8e-4),
+    ("camera y", 8e-4),
+];
+
+/// What it may depend on, the basis, and the sizes of its terms relative to the step: arena coordinates reach .6 m,
+/// differences of commands .1 m/s, runs about 1500 s.
+const DEPENDENCES: [(&str, &str, &[f64]); 5] = [
+    ("heading", "harmonics", &[1.0, 1.0, 1.0, 1.0]),
+    ("gate", "harmonics", &[1.0, 1.0, 1.0, 1.0, 1.0, 1.0]),
+    (
+        "place",
+        "polynomial",
+        &[1.0, 2.0, 2.0, 4.0, 4.0, 4.0, 8.0, 8.0, 8.0, 8.0],
+    ),
+    ("turn", "polynomial", &[1.0, 20.0, 400.0, 8000.0]),
+    ("time", "polynomial", &[1.0, 7e-4, 5e-7]),
+];
+
+impl Atlas {
+    /// The groups that explain a residual best at the sizes that linear algebra gives them: the best and those that are as
+    /// good with fewer coefficients.
+    pub(super) fn screen_groups(&self, simulate: &Simulate<'_>, residual: &White) -> Vec<Hypothesis> {
+        const MOST: usize = 3;
+        let all: Vec<usize> = (0..self.probes.len())
+            .filter(|&probe| *self.probes[probe].spec == UNLISTED)
+            .collect();
+        let jobs: Vec<(usize, usize)> = (all.iter())
+            .flat_map(|&probe| (0..self.probes[probe].free.len()).map(move |i| (probe, i)))
+            .collect();
+        let actions = self.actions(simulate, &jobs, GROUP_SETS);
+        let mut found: Vec<(f64, usize, Hypothesis)> = (all.iter())
+            .map(|&probe| {
+                let columns: Vec<&White> = (jobs.iter().zip(&actions))
+                    .filter(|((p, _), action)| *p == probe && action.is_some())
+                    .filter_map(|(_, action)| action.as_ref())
+                    .collect();
+                let (multiples, gain) = solve(&columns, residual);
+                let count = columns.len();
+                let part = Part::group(&self.probes[probe], probe, multiples.as_slice());
+                let score = gain - price(count, self.layout.total_laps());
+                (score, count, Hypothesis { parts: vec![part] })
+            })
+            .collect();
+        let most = found.iter().map(|f| f.0).fold(0.0, f64::max);
+        // The best stand first; among those that are as good, the shorter.
+        found.sort_by(|a, b| {
+            let good = |f: &(f64, usize, Hypothesis)| f.0 < AS_GOOD * most;
+            (good(a), if good(a) { 0 } else { a.1 })
+                .cmp(&(good(b), if good(b) { 0 } else { b.1 }))
+                .then(b.0.total_cmp(&a.0))
+        });
+        found.truncate(MOST);
+        found
+            .into_iter()
+            .filter(|f| f.0 > 0.3 * most)
+            .map(|f| f.2)
+            .collect()
+    }
+}
+
+/// Multiples of columns nearest to a target, and half the squared distance gained.
+fn solve(columns: &[&White], target: &White) -> (DVector<f64>, f64) {
+    let count = columns.len();
+    let normal = DMatrix::from_fn(count, count, |i, j| {
+        // Each column's own noise, which is a share of its number of entries, must not count as signal.
+        columns[i].dot(columns[j]) * if i == j { 1.0 + 1e-6 } else { 1.0 }
+    });
+    let right = DVector::from_fn(count, |i, _| columns[i].dot(target));
+    let multiples = normal
+        .cholesky()
+        .map_or_else(|| DVector::zeros(count), |factor| factor.solve(&right));
+    let gain = 0.5 * multiples.dot(&right);
+    (multiples, gain)
+}

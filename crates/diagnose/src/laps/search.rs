@@ -1,0 +1,167 @@
+//! The search for explanations of one data set: single effects, sizes that must be scanned, effects together, and causes
+//! without a name.
+
+use rayon::prelude::*;
+
+use super::atlas::{Atlas, Simulate, White};
+use super::expectation::Expectation;
+use super::hypothesis::{Hypothesis, Part};
+use super::refine::{Descent, Refined};
+use super::screen::Screened;
+use super::tests_of_fit::FourNumbers;
+use crate::{Candidate, Explanation};
+
+/// An explanation and what simulates it.
+#[derive(Debug, Clone)]
+pub(super) struct Found {
+    pub(super) hypothesis: Hypothesis,
+    pub(super) explanation: Explanation,
+}
+
+/// A search for explanations of one data set.
+pub(super) struct Search<'a> {
+    pub(super) atlas: &'a Atlas,
+    pub(super) simulate: &'a Simulate<'a>,
+    pub(super) data: &'a Expectation,
+    pub(super) residual: &'a White,
+}
+
+/// Rounds of a descent, each with the log-likelihood, and the share of the best one's, by which what lies behind then does
+/// not come back.
+const BEHIND: [(f64, f64); 3] = [(50.0, 0.2), (25.0, 0.05), (15.0, 0.015)];
+
+impl Search<'_> {
+    /// The best single effects, tried to the end, best first.
+    pub(super) fn singles(&self, screened: &[Screened]) -> Vec<Found> {
+        self.try_all(shortlist(screened).iter().map(|s| &s.hypothesis))
+    }
+
+    /// Effects whose action jumps with their size, at the best of many sizes: derivatives say nothing of them.
+    pub(super) fn scans(&self) -> Vec<Found> {
+        let combs = (0..self.atlas.probes.len()).filter(|&probe| self.atlas.probes[probe].jumps);
+        combs.filter_map(|probe| self.scan(probe)).collect()
+    }
+
+    fn scan(&self, probe: usize) -> Option<Found> {
+        let found = self.atlas.hunt(self.simulate, self.data, probe)?;
+        let refined = self.atlas.settle(self.simulate, self.data, &found)?;
+        Some(self.found(&refined))
+    }
+
+    /// The best pairs, tried to the end.
+    pub(super) fn pairs(&self) -> Vec<Found> {
+        const PAIRS: usize = 8;
+        let pairs = self.atlas.screen_pairs(self.residual, PAIRS);
+        self.try_all(pairs.iter().map(|pair| &pair.hypothesis))
+    }
+
+    /// The best explanations with what explains their remainder best beside them, tried to the end.
+    pub(super) fn further(&self, best: &[Found]) -> Vec<Found> {
+        const STARTS: usize = 2;
+        const FURTHER: usize = 3;
+        let starts = best.iter().take(STARTS).flat_map(|start| {
+            let left = self.atlas.left_by(self.simulate, self.data, &start.hypothesis);
+            let screened = left.map(|left| self.atlas.screen(&left)).unwrap_or_default();
+            let others = shortlist(&screened)
+                .into_iter()
+                .filter(|s| s.is_constant() && !self.shares_effect(s, start));
+            others
+                .take(FURTHER)
+                .map(|other| start.hypothesis.with(&other.hypothesis))
+                .collect::<Vec<_>>()
+        });
+        let starts: Vec<Hypothesis> = starts.collect();
+        self.try_all(starts.iter())
+    }
+
+    fn shares_effect(&self, screened: &Screened, found: &Found) -> bool {
+        let spec = |part: &Part| self.atlas.probes[part.probe].spec;
+        let own = spec(&screened.hypothesis.parts[0]);
+        found.hypothesis.parts.iter().any(|part| spec(part) == own)
+    }
+
+    /// Causes without a name: the groups of basis functions that explain most with fewest coefficients, tried to the end.
+    pub(super) fn unnamed(&self) -> Vec<Found> {
+        let starts = self.atlas.screen_groups(self.simulate, self.residual);
+        self.try_all(starts.iter())
+    }
+
+    /// Descends from every hypothesis round by round, dropping those that fall behind, then settles those that may still be
+    /// the best.
+    fn try_all<'h>(&self, hypotheses: impl Iterator<Item = &'h Hypothesis>) -> Vec<Found> {
+        let mut alive: Vec<Descent> = hypotheses
+            .map(|start| Descent::start(self.atlas, start))
+            .collect();
+        for behind in BEHIND {
+            alive = (alive.into_par_iter())
+                .filter_map(|descent| self.atlas.descend(self.simulate, self.data, descent))
+                .collect();
+            let best = (alive.iter().map(|d| d.score)).fold(f64::NEG_INFINITY, f64::max);
+            alive.retain(|d| d.score >= best - behind.0.max(behind.1 * best));
+        }
+        let mut found: Vec<Found> = (alive.par_iter())
+            .filter_map(|descent| self.atlas.settle(self.simulate, self.data, descent))
+            .map(|refined| self.found(&refined))
+            .collect();
+        sort(&mut found);
+        found
+    }
+
+    fn found(&self, refined: &Refined) -> Found {
+        let atlas = self.atlas;
+        let settings = refined.hypothesis.settings(atlas);
+        let mut effects: Vec<(f64, Candidate)> = (settings.into_iter().enumerate())
+            .map(|(part, setting)| {
+                let errors: Vec<f64> = refined.errors_of(part, atlas);
+                let fitted = errors.iter().filter(|e| **e > 0.0).count();
+                let candidate = Candidate {
+                    setting,
+                    standard_errors: errors,
+                    gain: refined.gain,
+                    fitted,
+                };
+                (refined.hypothesis.weight(part, atlas), candidate)
+            })
+            .collect();
+        effects.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let excess = |squares: f64| squares - self.residual.len() as f64;
+        let remainder = FourNumbers::new(&refined.residual, &atlas.layout);
+        Found {
+            hypothesis: refined.hypothesis.clone(),
+            explanation: Explanation {
+                effects: effects.into_iter().map(|(_, candidate)| candidate).collect(),
+                score: refined.score,
+                gain: refined.gain,
+                share: 1.0 - excess(refined.residual.norm_squared()) / excess(self.residual.norm_squared()),
+                remainder_p: remainder.omnibus_p(),
+                remainder: Some(remainder),
+            },
+        }
+    }
+}
+
+/// Best first.
+pub(super) fn sort(found: &mut [Found]) {
+    found.sort_by(|a, b| b.explanation.score.total_cmp(&a.explanation.score));
+}
+
+/// The screened hypotheses worth a simulation: each probe in its best pattern.
+fn shortlist(screened: &[Screened]) -> Vec<&Screened> {
+    const MOST: usize = 7;
+    let Some(best) = screened.first() else {
+        return Vec::new();
+    };
+    let mut list: Vec<&Screened> = Vec::new();
+    for candidate in screened {
+        let probe = candidate.hypothesis.parts[0].probe;
+        let seen = list.iter().any(|s| s.hypothesis.parts[0].probe == probe);
+        let hopeless = candidate.score < 0.7 * best.score - 20.0;
+        if list.len() == MOST || hopeless {
+            break;
+        }
+        if !seen {
+            list.push(candidate);
+        }
+    }
+    list
+}
