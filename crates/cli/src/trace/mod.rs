@@ -15,9 +15,9 @@ use sim::{Pattern, Setting};
 
 use answer::{FromLogs, from_logs, log_rows};
 pub(crate) use cache::Cache;
-pub(crate) use document::document;
+pub(crate) use document::{document, parameters};
 pub(crate) use error::{MeanLaps, mean};
-pub(crate) use pages::{sections, summary};
+pub(crate) use pages::{digest, sections, summary};
 use recording::{Recording, Seeds, held_out, simulate_all};
 
 use crate::config::{Config, ModelFile};
