@@ -4,19 +4,21 @@ mod answer;
 mod cache;
 mod document;
 mod error;
+mod next;
 mod pages;
 mod recording;
 
 use std::path::Path;
 
 use anyhow::{Result, ensure};
-use diagnose::{Answer, Atlas, FourNumbers, Simulate};
+use diagnose::{Answer, Atlas, Detectable, FourNumbers, Simulate};
 use sim::{Pattern, Setting};
 
 use answer::{FromLogs, from_logs, log_rows};
 pub(crate) use cache::Cache;
 pub(crate) use document::document;
 pub(crate) use error::{MeanLaps, mean};
+use next::{Experiment, experiments};
 pub(crate) use pages::{sections, summary};
 use recording::{Recording, Seeds, held_out, simulate_all};
 
@@ -45,6 +47,10 @@ pub(crate) struct Trace {
     pub(crate) errors: Vec<Errors>,
     /// What a reader must know of the data.
     pub(crate) remarks: Vec<String>,
+    /// Experiments that would tell the answer from what these data do not tell it from.
+    pub(crate) experiments: Vec<Experiment>,
+    /// The smallest sizes of effects that these data show; of laps without logs.
+    pub(crate) detectable: Vec<Detectable>,
     pub(crate) laps_simulated: u64,
 }
 
@@ -119,15 +125,19 @@ impl Trace {
         drop(progress);
         let errors = errors(&recordings, &answer, unseen, seed)?;
         interrupt::check()?;
-        Ok(Self {
+        let mut trace = Self {
             remarks: remarks(&recordings),
             laps_simulated: laps_simulated(&recordings, &atlas, from_logs.is_some()),
+            detectable: atlas.detectable(),
+            experiments: Vec::new(),
             recordings,
             residual,
             answer,
             from_logs,
             errors,
-        })
+        };
+        trace.experiments = experiments(&trace, seed)?;
+        Ok(trace)
     }
 
     /// The declared model with the effects of the answer.

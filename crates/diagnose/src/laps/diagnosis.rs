@@ -9,7 +9,7 @@ use super::tests_of_fit::FourNumbers;
 use crate::{Answer, Cause, Error, Explanation, Verdict};
 
 /// Score of the best probe from which a data set counts as departing from the declared model, whatever the omnibus says.
-const ALARM_SCORE: f64 = 7.0;
+pub(super) const ALARM_SCORE: f64 = 7.0;
 /// Omnibus probability below which it does.
 const ALARM_P: f64 = 0.002;
 /// Probability of the fit below which a remainder is significant.

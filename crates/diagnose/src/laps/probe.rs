@@ -59,6 +59,11 @@ impl Probe {
         Setting::constant(self.spec, values)
     }
 
+    /// Which parameter sizes it.
+    pub(super) fn size_index(&self) -> usize {
+        self.free[0].0
+    }
+
     /// The values where nothing is done.
     pub(super) fn origin(&self) -> &[f64] {
         &self.origin

@@ -40,6 +40,7 @@ impl Refined {
 }
 
 /// A hypothesis simulated.
+#[derive(Clone)]
 struct Evaluated {
     expectation: Expectation,
     /// Variance of the expectation in units of a data set's own.
@@ -414,7 +415,15 @@ impl Atlas {
                 self.evaluate(simulate, &moved, ROUND_SETS)
                     .map(|evaluated| (by, evaluated))
             };
-            let (down, up) = (at(-1.0)?, at(1.0)?);
+            // Where the robot crashes on one side, the other one tells the slope.
+            let nowhere = |side: Option<(Vec<f64>, Evaluated)>| {
+                side.unwrap_or_else(|| (vec![0.0; group.len()], center.clone()))
+            };
+            let (down, up) = (at(-1.0), at(1.0));
+            if down.is_none() && up.is_none() {
+                return None;
+            }
+            let (down, up) = (nowhere(down), nowhere(up));
             sides.push((group, down, up));
         }
         let all = sides
