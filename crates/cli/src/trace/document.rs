@@ -1,6 +1,8 @@
 //! `trace.json`.
 
-use diagnose::{Candidate, Cause, Channel, Decided, Detectable, Explanation, FourNumbers, Quadratic, Verdict};
+use diagnose::{
+    Candidate, Cause, Channel, Decided, Detectable, Explanation, FourNumbers, Quadratic, Verdict,
+};
 use serde_json::{Value, json};
 use sim::Pattern;
 

@@ -5,9 +5,9 @@ use diagnose::{Candidate, Explanation, LogRow, Rival, log_separation, separation
 use sim::{Controller, Setting, Step, Streams};
 use track::Lap;
 
+use super::Trace;
 use super::answer::rivals;
 use super::recording::{Recording, Seeds};
-use super::Trace;
 use crate::config::Config;
 use crate::interrupt;
 use crate::setup::Setup;
@@ -38,7 +38,10 @@ pub(crate) struct Experiment {
 impl Experiment {
     /// Standard deviations between the answer and the rival that is nearest to it.
     pub(crate) fn least(&self) -> f64 {
-        self.separations.iter().map(|(_, s)| *s).fold(f64::INFINITY, f64::min)
+        self.separations
+            .iter()
+            .map(|(_, s)| *s)
+            .fold(f64::INFINITY, f64::min)
     }
 
     /// Laps that tell the answer from every rival; `None` if that would take more than ten times as many.
@@ -55,12 +58,20 @@ fn ideas(config: &Config, setup: &Setup) -> Vec<(String, Vec<(&'static str, Stri
         crate::config::Direction::Clockwise => "counter-clockwise",
         crate::config::Direction::CounterClockwise => "clockwise",
     };
-    ideas.push((format!("{backward} laps"), vec![("run.direction", backward.to_owned())]));
+    ideas.push((
+        format!("{backward} laps"),
+        vec![("run.direction", backward.to_owned())],
+    ));
     let (gain_key, gain) = match setup.model.machine.controller {
         Controller::Braitenberg { gain_per_count, .. } => ("controller.gain_per_count", 2.0 * gain_per_count),
-        Controller::RuleBased { threshold_counts, .. } => ("controller.threshold_counts", 0.6 * threshold_counts),
+        Controller::RuleBased { threshold_counts, .. } => {
+            ("controller.threshold_counts", 0.6 * threshold_counts)
+        }
     };
-    ideas.push((format!("laps with {gain_key} = {gain}"), vec![(gain_key, gain.to_string())]));
+    ideas.push((
+        format!("laps with {gain_key} = {gain}"),
+        vec![(gain_key, gain.to_string())],
+    ));
     let speed = 0.6 * setup.model.machine.controller.speed_m_s();
     ideas.push((
         format!("laps with controller.speed_m_s = {speed}"),
@@ -79,7 +90,10 @@ pub(crate) fn experiments(trace: &Trace, seed: u64) -> Result<Vec<Experiment>> {
     };
     let mut others: Vec<&Explanation> = Vec::new();
     for rival in rivals(&trace.answer).iter().skip(1) {
-        let known = others.iter().chain([&answer]).any(|other| other.names() == rival.names());
+        let known = others
+            .iter()
+            .chain([&answer])
+            .any(|other| other.names() == rival.names());
         if !known && others.len() < RIVALS {
             others.push(rival);
         }
@@ -115,7 +129,9 @@ pub(crate) fn experiments(trace: &Trace, seed: u64) -> Result<Vec<Experiment>> {
         }
     }
     found.retain(|experiment| experiment.least() > 0.5);
-    found.sort_by(|a, b| (b.least() / (b.laps as f64).sqrt()).total_cmp(&(a.least() / (a.laps as f64).sqrt())));
+    found.sort_by(|a, b| {
+        (b.least() / (b.laps as f64).sqrt()).total_cmp(&(a.least() / (a.laps as f64).sqrt()))
+    });
     Ok(found)
 }
 
@@ -128,7 +144,12 @@ fn changed(recording: &Recording, declared: &[(&'static str, String)]) -> Option
     Setup::new(&config, recording.measured.circuit.clone(), None).ok()
 }
 
-fn by_laps(setup: &Setup, answer: &Explanation, others: &[&Explanation], seed: u64) -> Option<Vec<(String, f64)>> {
+fn by_laps(
+    setup: &Setup,
+    answer: &Explanation,
+    others: &[&Explanation],
+    seed: u64,
+) -> Option<Vec<(String, f64)>> {
     let simulate = |effects: &[Setting], set: u64| -> Option<Vec<Vec<Lap>>> {
         Recording::drive(setup, effects, Seeds { session: seed, set }, &[LAPS; RUNS], 0)
     };
@@ -142,12 +163,25 @@ fn by_laps(setup: &Setup, answer: &Explanation, others: &[&Explanation], seed: u
     Some(named(others, found))
 }
 
-fn by_logs(setup: &Setup, answer: &Explanation, others: &[&Explanation], seed: u64) -> Option<Vec<(String, f64)>> {
+fn by_logs(
+    setup: &Setup,
+    answer: &Explanation,
+    others: &[&Explanation],
+    seed: u64,
+) -> Option<Vec<(String, f64)>> {
     let rows = logs(setup, &first_runs(&answer.settings()), seed)?;
     let runs: Vec<&[LogRow]> = rows.iter().map(Vec::as_slice).collect();
     let found = others
         .iter()
-        .map(|other| log_separation(&setup.model, &setup.scene, &runs, &answer.settings(), &other.settings()))
+        .map(|other| {
+            log_separation(
+                &setup.model,
+                &setup.scene,
+                &runs,
+                &answer.settings(),
+                &other.settings(),
+            )
+        })
         .collect();
     Some(named(others, found))
 }
@@ -156,7 +190,11 @@ fn named(others: &[&Explanation], found: Vec<Option<f64>>) -> Vec<(String, f64)>
     // A rival with which the robot crashes is told apart by the first lap.
     const CERTAIN: f64 = 1e3;
     let name = |other: &&Explanation| other.names().join(" + ");
-    others.iter().map(name).zip(found.into_iter().map(|s| s.unwrap_or(CERTAIN))).collect()
+    others
+        .iter()
+        .map(name)
+        .zip(found.into_iter().map(|s| s.unwrap_or(CERTAIN)))
+        .collect()
 }
 
 /// Simulated logs of a robot with effects.

@@ -37,7 +37,8 @@ impl Atlas {
         let nodes = self.nodes(probe);
         let needed = self.needed(p.free.len());
         let side = |sign: f64| {
-            let own: Vec<&(f64, White)> = (nodes.iter().filter(|(s, _)| sign * (s - p.neutral) > 0.0)).collect();
+            let own: Vec<&(f64, White)> =
+                (nodes.iter().filter(|(s, _)| sign * (s - p.neutral) > 0.0)).collect();
             let mut own: Vec<(f64, &White)> = own.iter().map(|(s, w)| ((s - p.neutral).abs(), w)).collect();
             own.sort_by(|a, b| a.0.total_cmp(&b.0));
             smallest(&own, needed).map(|size| p.neutral + sign * size)

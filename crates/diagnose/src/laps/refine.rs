@@ -107,7 +107,7 @@ impl Atlas {
         let (moves, covariance) = nearest(&local.columns, &target, freedoms);
         let left = left_of(&local.columns, &target, &moves).norm_squared() / (1.0 + local.error);
         let gain = self.gain(data, left, &local.scatter);
-        let score = hypothesis.worth(gain) - price(freedoms.len(), self.layout.total_laps());
+        let score = hypothesis.worth(gain) - self.price_of(hypothesis);
         let settled = (0..moves.len()).all(|i| moves[i].abs() < 0.5 * covariance[(i, i)].sqrt());
         let by: Vec<(Freedom, f64)> = freedoms.iter().copied().zip(moves.iter().copied()).collect();
         *hypothesis = hypothesis.moved(self, &by);
@@ -205,6 +205,12 @@ impl Atlas {
         0.5 * (before - left - wider)
     }
 
+    /// What a hypothesis pays for its fitted numbers and for the choice of its probes.
+    fn price_of(&self, hypothesis: &Hypothesis) -> f64 {
+        let choices: f64 = hypothesis.parts.iter().map(|part| self.choice(part.probe)).sum();
+        price(hypothesis.freedoms(self).len(), self.layout.total_laps()) + choices
+    }
+
     /// The scatter of simulated data sets, recording by recording.
     fn scatter_of<'a>(&self, summaries: impl Iterator<Item = &'a Summary> + Clone) -> Option<Vec<Scatter>> {
         let of = |(g, declared): (usize, &Scatter)| {
@@ -238,7 +244,7 @@ impl Atlas {
         let scatter = self.scatter_of(end.summaries.iter())?;
         let residual = white(&scatter, &self.layout, data, &end.expectation) / (1.0 + end.error).sqrt();
         let gain = self.gain(data, residual.norm_squared(), &scatter);
-        let score = hypothesis.worth(gain) - price(errors.len(), self.layout.total_laps());
+        let score = hypothesis.worth(gain) - self.price_of(&hypothesis);
         Some(Refined {
             hypothesis,
             errors,

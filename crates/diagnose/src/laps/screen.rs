@@ -2,6 +2,8 @@
 
 use std::ops::Range;
 
+use sim::UNLISTED;
+
 use super::atlas::{Atlas, White};
 use super::hypothesis::{Hypothesis, Part, Shape};
 use super::layout::ramp_norm;
@@ -73,6 +75,22 @@ impl Atlas {
         nodes
     }
 
+    /// The price of having chosen one probe among those of its effect: the logarithm of how many there are, less what is
+    /// fitted of the choice.
+    pub(super) fn choice(&self, probe: usize) -> f64 {
+        let chosen = &self.probes[probe];
+        let alike = self
+            .probes
+            .iter()
+            .filter(|p| p.spec == chosen.spec && *p.spec != UNLISTED)
+            .count();
+        if chosen.free.len() == 2 {
+            // A direction is fitted.
+            return 0.0;
+        }
+        (alike.max(1) as f64).ln()
+    }
+
     /// What a size that grows by one from lap to lap does to the trends, by what it does to the mean laps.
     fn change_per_lap(&self, tangent: &White) -> White {
         let mut change = White::zeros(tangent.len());
@@ -130,7 +148,7 @@ impl Atlas {
             }
         };
         let gain = residual.norm_squared() - (residual - &action).norm_squared();
-        let score = worth(0.5 * gain, shape) - price(fitted, self.layout.total_laps());
+        let score = worth(0.5 * gain, shape) - price(fitted, self.layout.total_laps()) - self.choice(probe);
         Some(Screened {
             hypothesis: Hypothesis {
                 parts: vec![Part::screened(self, probe, shape, &size_at)],

@@ -28,7 +28,7 @@ pub(super) struct Search<'a> {
 
 /// Rounds of a descent, each with the log-likelihood, and the share of the best one's, by which what lies behind then does
 /// not come back.
-const BEHIND: [(f64, f64); 3] = [(50.0, 0.2), (25.0, 0.05), (15.0, 0.015)];
+const BEHIND: [(f64, f64); 3] = [(50.0, 0.2), (30.0, 0.05), (20.0, 0.015)];
 
 impl Search<'_> {
     /// The best single effects, tried to the end, best first.

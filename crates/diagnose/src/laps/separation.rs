@@ -25,7 +25,11 @@ pub struct Rival {
 /// altogether, where the robot crashes.
 ///
 /// `simulate` simulates the experiment.
-pub fn separations(simulate: &Simulate<'_>, answer: &[Setting], rivals: &[Rival]) -> Option<Vec<Option<f64>>> {
+pub fn separations(
+    simulate: &Simulate<'_>,
+    answer: &[Setting],
+    rivals: &[Rival],
+) -> Option<Vec<Option<f64>>> {
     let declared = simulated(simulate, &[])?;
     let answered = simulated(simulate, answer)?;
     let first = simulate(answer, 0)?;
@@ -34,7 +38,10 @@ pub fn separations(simulate: &Simulate<'_>, answer: &[Setting], rivals: &[Rival]
         lap: answered[0].0[0].scatter.nrows(),
     };
     let other = Scatter::of_few(declared.iter().map(|summary| &summary.0[0]))?;
-    let scatter = [Scatter::of_laps(answered.iter().map(|summary| &summary.0[0]), &other)?];
+    let scatter = [Scatter::of_laps(
+        answered.iter().map(|summary| &summary.0[0]),
+        &other,
+    )?];
     let halves = |summaries: &[Summary]| {
         let (a, b) = summaries.split_at(summaries.len() / 2);
         [a, b].map(|half| Expectation::of(half.iter(), true))

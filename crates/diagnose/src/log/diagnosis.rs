@@ -193,12 +193,21 @@ impl<'a> Search<'a> {
         /// Log-likelihood, and share of the best one's, by which what lies behind after the first steps does not come back.
         const BEHIND: (f64, f64) = (30.0, 0.06);
         let pursue = |lead: &Lead, steps| {
-            pursue(&self.evidence, &self.variants[lead.variant], lead, &self.base, steps)
+            pursue(
+                &self.evidence,
+                &self.variants[lead.variant],
+                lead,
+                &self.base,
+                steps,
+            )
         };
         let first: Vec<(&Lead, Refined)> = (list.par_iter())
             .filter_map(|lead| Some((lead, pursue(lead, FIRST_STEPS)?)))
             .collect();
-        let best = first.iter().map(|(_, refined)| refined.score()).fold(0.0, f64::max);
+        let best = first
+            .iter()
+            .map(|(_, refined)| refined.score())
+            .fold(0.0, f64::max);
         first
             .into_par_iter()
             .map(|(lead, refined)| {
@@ -208,7 +217,9 @@ impl<'a> Search<'a> {
                 }
                 match lead.by {
                     By::Run => pursue(lead, STEPS).unwrap_or(refined),
-                    By::Constant | By::Time => refined.further(&self.evidence, &self.variants, self.total(), STEPS),
+                    By::Constant | By::Time => {
+                        refined.further(&self.evidence, &self.variants, self.total(), STEPS)
+                    }
                 }
             })
             .collect()

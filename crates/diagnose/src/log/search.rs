@@ -183,7 +183,13 @@ impl Refined {
     }
 
     /// Refined by further steps from where it is; `base` is the log-likelihood of the declared model.
-    pub(crate) fn further(self, evidence: &Evidence<'_>, variants: &[Variant], base: f64, steps: usize) -> Self {
+    pub(crate) fn further(
+        self,
+        evidence: &Evidence<'_>,
+        variants: &[Variant],
+        base: f64,
+        steps: usize,
+    ) -> Self {
         let knobs = self.knobs(variants);
         match refine(evidence, self.settings.clone(), knobs, steps) {
             Some(fitted) => refined(fitted, base, self.by),
