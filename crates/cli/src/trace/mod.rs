@@ -4,9 +4,11 @@ mod answer;
 mod cache;
 mod document;
 mod error;
+mod limits;
 mod next;
 mod pages;
 mod recording;
+mod unnamed;
 
 use std::path::Path;
 
@@ -19,7 +21,7 @@ pub(crate) use cache::Cache;
 pub(crate) use document::document;
 pub(crate) use error::{MeanLaps, mean};
 use next::{Experiment, experiments};
-pub(crate) use pages::{sections, summary};
+pub(crate) use pages::{gates_csv, sections, summary};
 use recording::{Recording, Seeds, held_out, simulate_all};
 
 use crate::config::{Config, ModelFile};
