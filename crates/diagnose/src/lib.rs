@@ -13,6 +13,6 @@ pub use answer::{Answer, Cause, Explanation, Verdict};
 pub use candidate::Candidate;
 pub use corners::{Corners, other_cuts};
 pub use error::Error;
-pub use laps::{Atlas, FourNumbers, LapDiagnosis, Quadratic, Simulate};
+pub use laps::{Atlas, Baselines, FourNumbers, LapDiagnosis, Quadratic, Simulate};
 pub use log::{Channel, Decided, LogDiagnosis, LogRow, diagnose_logs};
 pub use response_fit::{Estimate, ResponseFit};

@@ -1,6 +1,7 @@
 //! Diagnosis from laps that the camera saw.
 
 mod atlas;
+mod baseline;
 mod diagnosis;
 mod expectation;
 mod groups;
@@ -15,5 +16,6 @@ mod summary;
 mod tests_of_fit;
 
 pub use atlas::{Atlas, Simulate};
+pub use baseline::Baselines;
 pub use diagnosis::LapDiagnosis;
 pub use tests_of_fit::{FourNumbers, Quadratic};
