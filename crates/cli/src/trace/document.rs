@@ -36,6 +36,11 @@ pub(crate) fn document(trace: &Trace) -> Value {
         "remarks": trace.remarks,
         "laps_simulated": trace.laps_simulated,
     });
+    if let Some(baselines) = &trace.baselines {
+        document["baselines"] = json!({
+            "mean_lap_rms": baselines.mean_lap_rms, "two_modes": baselines.two_modes,
+        });
+    }
     if let Some(found) = &trace.from_logs {
         document["logs"] = logs(found);
     }

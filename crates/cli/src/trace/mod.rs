@@ -13,7 +13,7 @@ mod unnamed;
 use std::path::Path;
 
 use anyhow::{Result, ensure};
-use diagnose::{Answer, Atlas, Detectable, FourNumbers, Simulate};
+use diagnose::{Answer, Atlas, Baselines, Detectable, FourNumbers, Simulate};
 use sim::{Pattern, Setting};
 
 use answer::{FromLogs, from_logs, log_rows};
@@ -45,6 +45,8 @@ pub(crate) struct Trace {
     pub(crate) answer: Answer,
     /// What the robot's logs say, where there are logs.
     pub(crate) from_logs: Option<FromLogs>,
+    /// What simpler ways of naming say of the laps, where there are no logs.
+    pub(crate) baselines: Option<Baselines>,
     /// The error, recording by recording.
     pub(crate) errors: Vec<Errors>,
     /// What a reader must know of the data.
@@ -108,6 +110,7 @@ impl Trace {
             })
             .collect::<Result<Vec<_>>>()?;
         let atlas = Atlas::join(parts).expect("at least one data set is measured");
+        let baselines = logged.is_none().then(|| atlas.baselines(&laps)).transpose()?;
         let progress = session.progress("naming the effect", 1);
         let (residual, answer, from_logs) = match logged {
             Some((recording, rows)) => {
@@ -136,6 +139,7 @@ impl Trace {
             residual,
             answer,
             from_logs,
+            baselines,
             errors,
         };
         trace.experiments = experiments(&trace, seed)?;

@@ -199,6 +199,17 @@ impl Scatter {
         whiten(&self.mean, mean)
     }
 
+    /// The mean lap of [`Scatter::whiten_mean`].
+    pub(super) fn unwhiten_mean(&self, white: &DVector<f64>) -> DVector<f64> {
+        self.mean.l() * white
+    }
+
+    /// The covariance of one lap.
+    pub(super) fn of_lap(&self) -> DMatrix<f64> {
+        let l = self.lap.l();
+        &l * l.transpose()
+    }
+
     /// A vector of one lap's covariance in units of it.
     pub(super) fn whiten(&self, lap: &DVector<f64>) -> DVector<f64> {
         whiten(&self.lap, lap)

@@ -1,6 +1,7 @@
 //! Diagnosis from laps that the camera saw.
 
 mod atlas;
+mod baseline;
 mod detectable;
 mod diagnosis;
 mod expectation;
@@ -17,6 +18,7 @@ mod summary;
 mod tests_of_fit;
 
 pub use atlas::{Atlas, Simulate};
+pub use baseline::Baselines;
 pub use detectable::Detectable;
 pub use diagnosis::LapDiagnosis;
 pub use separation::{Rival, separations};

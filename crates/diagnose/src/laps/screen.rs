@@ -176,7 +176,11 @@ pub(super) fn worth(gain: f64, shape: Shape) -> f64 {
 
 /// The point of a path that is nearest to the residual in some entries, and its size. Beyond its ends the path goes on
 /// straight for [`BEYOND`] of its last piece.
-fn nearest(nodes: &[(f64, White)], residual: &White, entries: Range<usize>) -> Option<(f64, White)> {
+pub(super) fn nearest(
+    nodes: &[(f64, White)],
+    residual: &White,
+    entries: Range<usize>,
+) -> Option<(f64, White)> {
     let (first, count) = (entries.start, entries.len());
     let target = residual.rows(first, count);
     let mut best: Option<(f64, f64, White)> = None;
