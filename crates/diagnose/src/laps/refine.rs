@@ -30,6 +30,8 @@ pub(super) struct Refined {
     pub(super) gain: f64,
     /// `gain` less the price of the fitted numbers.
     pub(super) score: f64,
+    /// Standard deviation of the gain for the simulation's own error.
+    pub(super) gain_error: f64,
 }
 
 impl Refined {
@@ -246,6 +248,7 @@ impl Atlas {
         let gain = self.gain(data, residual.norm_squared(), &scatter);
         let score = hypothesis.worth(gain) - self.price_of(&hypothesis);
         Some(Refined {
+            gain_error: (residual.norm_squared() * end.error).sqrt(),
             hypothesis,
             errors,
             residual,

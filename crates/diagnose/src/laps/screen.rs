@@ -139,6 +139,8 @@ impl Atlas {
                 let sizes = parts.into_iter().map(|part| part.0).collect();
                 (sizes, action, p.free.len() - 1 + runs)
             }
+            // What changes in time by itself is no candidate for a change of that change.
+            Shape::ByTime if p.drifts() => return None,
             Shape::ByTime => {
                 let (s, action) = nearest(nodes, residual, everything)?;
                 let change = self.change_per_lap(&tangent(nodes, s));

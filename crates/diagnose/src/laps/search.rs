@@ -16,6 +16,8 @@ use crate::{Candidate, Explanation};
 pub(super) struct Found {
     pub(super) hypothesis: Hypothesis,
     pub(super) explanation: Explanation,
+    /// Standard deviation of its log-likelihood for the simulation's own error.
+    pub(super) gain_error: f64,
 }
 
 /// A search for explanations of one data set.
@@ -127,6 +129,7 @@ impl Search<'_> {
         let excess = |squares: f64| squares - self.residual.len() as f64;
         let remainder = FourNumbers::new(&refined.residual, &atlas.layout);
         Found {
+            gain_error: refined.gain_error,
             hypothesis: refined.hypothesis.clone(),
             explanation: Explanation {
                 effects: effects.into_iter().map(|(_, candidate)| candidate).collect(),
