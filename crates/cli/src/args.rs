@@ -79,6 +79,7 @@ pub(crate) struct Settings {
 
 /// Both experiments of section IV: the two controllers, the sensor models, the wall approximation, the wheel slip,
 /// and all of them together; every table of the paper beside ours, every figure, and each claim with its numbers.
+/// In the end what the model lacks in these laps is traced, and Tables II and III are made again with it.
 ///
 /// Example: lapwing reproduce --seeds 100 --out report
 #[derive(Debug, Args)]
@@ -92,9 +93,25 @@ pub(crate) struct Reproduce {
     /// How often everything is simulated, each time with random numbers of its own: what the intervals rest on
     #[arg(long, default_value_t = SEEDS, value_name = "N", value_parser = clap::value_parser!(u32).range(2..))]
     pub(crate) seeds: u32,
+    /// Leave out the last part, which traces what the model lacks in the measured laps
+    #[arg(long)]
+    pub(crate) no_trace: bool,
+    #[command(flatten)]
+    pub(crate) signatures: Signatures,
     /// Print tables.json instead of tables
     #[arg(long)]
     pub(crate) json: bool,
+}
+
+/// Where the signatures of models are kept.
+#[derive(Debug, Clone, Default, Args)]
+pub(crate) struct Signatures {
+    /// Folder in which the signatures of models are kept [default: the platform's cache folder]
+    #[arg(long, value_name = "DIR")]
+    pub(crate) cache: Option<PathBuf>,
+    /// Simulate the signatures anew and keep nothing
+    #[arg(long)]
+    pub(crate) no_cache: bool,
 }
 
 /// Of `--seeds` of [`Reproduce`].
@@ -106,6 +123,8 @@ impl Default for Reproduce {
             measured: Vec::new(),
             out: None,
             seeds: SEEDS,
+            no_trace: false,
+            signatures: Signatures::default(),
             json: false,
         }
     }
@@ -281,12 +300,8 @@ pub(crate) struct Trace {
     /// Folder for the report
     #[arg(long, value_name = "DIR")]
     pub(crate) out: PathBuf,
-    /// Folder in which the signatures of models are kept [default: the platform's cache folder]
-    #[arg(long, value_name = "DIR")]
-    pub(crate) cache: Option<PathBuf>,
-    /// Simulate the signatures anew and keep nothing
-    #[arg(long)]
-    pub(crate) no_cache: bool,
+    #[command(flatten)]
+    pub(crate) signatures: Signatures,
     /// Print trace.json
     #[arg(long)]
     pub(crate) json: bool,

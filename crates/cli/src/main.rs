@@ -2,6 +2,7 @@
 #![allow(clippy::print_stdout)] // results go to stdout
 
 mod args;
+mod case_study;
 mod commands;
 mod config;
 mod dataset;

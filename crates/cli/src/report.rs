@@ -72,6 +72,9 @@ fn contents(sections: &[Section]) -> String {
 
 fn write_block(html: &mut String, block: &Block) -> Result<()> {
     match block {
+        Block::Heading(text) => {
+            let _ = writeln!(html, "<h3>{}</h3>", escape(text));
+        }
         Block::Text(text) => {
             let _ = writeln!(html, "<p>{}</p>", escape(text));
         }
@@ -108,7 +111,7 @@ fn write_picture(html: &mut String, picture: &Picture) -> Result<()> {
     let _ = writeln!(
         html,
         "<figure{class}>\n<div class=\"wide\">{svg}</div>\n<figcaption><b>{}.</b> {}</figcaption>\n</figure>",
-        escape(picture.number),
+        escape(&picture.number),
         escape(&picture.caption)
     );
     Ok(())

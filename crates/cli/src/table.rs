@@ -2,6 +2,9 @@
 
 use std::fmt::Write as _;
 
+/// A cell of more characters than this is broken into lines.
+const PROSE: usize = 40;
+
 /// Named columns and rows of words.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct Table {
@@ -77,9 +80,12 @@ impl Table {
     /// As an HTML table; the title is its caption.
     pub(crate) fn to_html(&self) -> String {
         let cells = |tag: &str, row: &[String]| {
-            row.iter()
-                .map(|cell| format!("<{tag}>{}</{tag}>", escape(cell)))
-                .collect::<String>()
+            let cell = |cell: &String| {
+                let prose = tag == "td" && cell.chars().count() > PROSE;
+                let class = if prose { " class=\"prose\"" } else { "" };
+                format!("<{tag}{class}>{}</{tag}>", escape(cell))
+            };
+            row.iter().map(cell).collect::<String>()
         };
         let mut html = String::from("<table>\n");
         if !self.title.is_empty() {
@@ -129,6 +135,9 @@ mod tests {
             "T\nrun       d\n-----------\na & b   1.0\nc      10.0\n"
         );
         assert!(table.to_html().contains("<td>a &amp; b</td>"));
+        table.push(["a sentence that does not fit into the width of a column", "-"]);
+        assert!(table.to_html().contains("<td class=\"prose\">a sentence"));
+        table.rows.pop();
         table.push(["d, \"e\"", "2"]);
         assert!(table.to_csv().ends_with("c,10.0\n\"d, \"\"e\"\"\",2\n"));
     }

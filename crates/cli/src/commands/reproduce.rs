@@ -6,6 +6,7 @@ use anyhow::Result;
 use serde_json::{Map, Value, json};
 
 use crate::args::Reproduce;
+use crate::case_study::CaseStudy;
 use crate::dataset::DataSet;
 use crate::experiments::{Block, Claim, EXPERIMENTS, Measurements, Outcome, Section, Study};
 use crate::interrupt;
@@ -14,6 +15,7 @@ use crate::ray_study;
 use crate::report::Report;
 use crate::session::Session;
 use crate::table::Table;
+use crate::trace::Cache;
 
 /// Numbers of segments whose ray casting is measured.
 const SEGMENTS: [usize; 5] = [15, 47, 105, 1000, 10_000];
@@ -34,7 +36,7 @@ pub(crate) fn run(session: &Session, args: &Reproduce) -> Result<()> {
     let inputs = measured.inputs();
     let configuration = json!({
         "standard": measured.standard()?, "rule_based": measured.rule_based()?,
-        "seed": session.seed(), "seeds": args.seeds, "inputs": inputs,
+        "seed": session.seed(), "seeds": args.seeds, "trace": !args.no_trace, "inputs": inputs,
     });
     let folder = OutDir::create(&out, &Work::new("reproduce", &configuration), false)?;
     let draws = args.seeds as usize;
@@ -60,8 +62,12 @@ pub(crate) fn run(session: &Session, args: &Reproduce) -> Result<()> {
         ladder_draws,
     )?;
     drop(progress);
-    let tables = tables_json(session.seed(), draws, &outcomes);
-    let text = text(&outcomes, &out);
+    let cache = Cache::new(&args.signatures);
+    let case_study = (!args.no_trace)
+        .then(|| CaseStudy::new(session, &study, &cache))
+        .transpose()?;
+    let tables = tables_json(session.seed(), draws, &outcomes, case_study.as_ref());
+    let text = text(&outcomes, case_study.as_ref(), &out);
     let mut files = report(session.seed(), &study, outcomes);
     let place = files.report.sections.len() - 2; // after the experiments
     files
@@ -71,6 +77,12 @@ pub(crate) fn run(session: &Session, args: &Reproduce) -> Result<()> {
     files
         .csv
         .push(("ladder.csv", ray_study::ladder_table(&rungs).to_csv()));
+    if let Some(case_study) = &case_study {
+        files.report.sections.push(case_study.section());
+        for (name, text) in case_study.files() {
+            folder.write(&name, text)?;
+        }
+    }
     write(&folder, &tables, files)?;
     folder.write(ray_study::PICTURE, ray_study::figure(&costs, &rungs).to_svg()?)?;
     interrupt::check()?;
@@ -83,13 +95,14 @@ pub(crate) fn run(session: &Session, args: &Reproduce) -> Result<()> {
 }
 
 /// `tables.json`.
-fn tables_json(seed: u64, draws: usize, outcomes: &[Outcome]) -> Value {
+fn tables_json(seed: u64, draws: usize, outcomes: &[Outcome], case_study: Option<&CaseStudy>) -> Value {
     let mut tables = Map::new();
     tables.insert("seed".into(), seed.into());
     tables.insert("draws".into(), draws.into());
     let parts = outcomes.iter().flat_map(|outcome| outcome.json.iter().cloned());
     tables.extend(parts.map(|(key, value)| (key.to_owned(), value)));
     tables.insert("claims".into(), claims(outcomes).map(Claim::json).collect());
+    tables.extend(case_study.map(|study| ("trace".to_owned(), study.json())));
     Value::Object(tables)
 }
 
@@ -97,8 +110,8 @@ fn claims(outcomes: &[Outcome]) -> impl Iterator<Item = &Claim> {
     outcomes.iter().flat_map(|outcome| outcome.section.claims())
 }
 
-/// What is printed: every table, every claim, and where the report is.
-fn text(outcomes: &[Outcome], out: &Path) -> String {
+/// What is printed: every table, every claim, what the model lacks, and where the report is.
+fn text(outcomes: &[Outcome], case_study: Option<&CaseStudy>, out: &Path) -> String {
     let mut text = String::new();
     for table in outcomes.iter().flat_map(|outcome| outcome.section.tables()) {
         text += &format!("{}\n", table.to_text());
@@ -116,6 +129,9 @@ fn text(outcomes: &[Outcome], out: &Path) -> String {
             claim.paper,
             claim.here
         );
+    }
+    if let Some(case_study) = case_study {
+        text += &format!("\n{}", case_study.text());
     }
     text + &format!("\nreport: {}\n", out.join("report.html").display())
 }

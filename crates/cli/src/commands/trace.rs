@@ -25,7 +25,7 @@ pub(crate) fn run(session: &Session, args: &args::Trace) -> Result<()> {
         "model": file.config, "seed": session.seed(), "measured": args.measured, "held_out": args.held_out, "inputs": inputs,
     });
     let folder = OutDir::create(&args.out, &Work::new("trace", &configuration), false)?;
-    let cache = Cache::new(args.cache.as_deref(), !args.no_cache);
+    let cache = Cache::new(&args.signatures);
     let world = args.model.settings.world.as_deref();
     let trace = Trace::new(session, &file, world, sets, held_out, &cache)?;
     let document = document(&trace);

@@ -32,26 +32,30 @@ pub(crate) struct Distances {
 impl Distances {
     /// The paper's line and ours for each simulation.
     pub(crate) fn table(&self) -> Table {
+        self.beside(&self.title, "here", &[])
+    }
+
+    /// The paper's line, ours under a name, and those of others with the same simulations under theirs.
+    pub(crate) fn beside(&self, title: &str, name: &str, others: &[(&str, &Self)]) -> Table {
         let heads: Vec<String> = self.runs.iter().map(|run| format!("run {run}")).collect();
         let columns: Vec<&str> = ["distance to"]
             .into_iter()
             .chain(heads.iter().map(String::as_str))
             .collect();
-        let mut table = Table::new(&self.title, &columns);
-        for row in &self.rows {
+        let mut table = Table::new(title, &columns);
+        for (place, row) in self.rows.iter().enumerate() {
+            let mut line = |name: &str, cells: Vec<String>| {
+                let head = format!("{}, {name}", row.name);
+                table.push([head].into_iter().chain(cells));
+            };
             if let Some(paper) = row.paper {
                 let cell = |run: &String| paper.of_run(run).map_or("-".into(), |d| format!("{d:.1}"));
-                table.push(
-                    [format!("{}, paper", row.name)]
-                        .into_iter()
-                        .chain(self.runs.iter().map(cell)),
-                );
+                line("paper", self.runs.iter().map(cell).collect());
             }
-            table.push(
-                [format!("{}, here", row.name)]
-                    .into_iter()
-                    .chain(row.here.iter().map(|e| e.text(1))),
-            );
+            for (name, distances) in [(name, self)].iter().chain(others) {
+                let here = &distances.rows[place].here;
+                line(name, here.iter().map(|e| e.text(1)).collect());
+            }
         }
         table
     }
@@ -181,6 +185,12 @@ mod tests {
         let table = distances.table();
         assert_eq!(table.rows[0], ["improved sensor, paper", "0.5", "-"]);
         assert_eq!(table.rows[1][2], "4.0");
+        let beside = distances.beside("T", "before", &[("after", &distances)]);
+        let heads: Vec<&str> = beside.rows.iter().map(|row| row[0].as_str()).collect();
+        assert_eq!(
+            heads,
+            ["paper", "before", "after"].map(|line| format!("improved sensor, {line}"))
+        );
         assert_eq!(distances.json()["improved"]["d"]["paper"], 0.5);
         assert_eq!(distances.json()["improved"]["x"]["distance"], 4.0);
         assert!(distances.csv().ends_with("improved,x,,4,4,4,4\n"));

@@ -13,11 +13,13 @@ mod slip;
 mod study;
 mod table_ii;
 mod table_iii;
+mod with_effects;
 
 pub(crate) use comparison::Comparison;
 pub(crate) use estimate::Estimate;
 pub(crate) use outcome::{Block, Claim, Outcome, Picture, Section};
 pub(crate) use study::{Measurements, Study};
+pub(crate) use with_effects::{BeforeAfter, runs_per_draw, tables};
 
 /// An experiment of the paper.
 pub(crate) type Experiment = fn(&Study) -> anyhow::Result<Outcome>;

@@ -26,6 +26,8 @@ pub(crate) struct Section {
 /// A part of a section.
 #[derive(Debug, Clone)]
 pub(crate) enum Block {
+    /// Begins a part of the section.
+    Heading(String),
     Text(String),
     /// As it stands, in a fixed pitch.
     Code(String),
@@ -44,9 +46,9 @@ pub(crate) enum Block {
 #[derive(Debug, Clone)]
 pub(crate) struct Picture {
     /// Its file's name without the ending.
-    pub(crate) file: &'static str,
+    pub(crate) file: String,
     /// `Fig. 10`: the paper's numbers, letters for figures that the paper does not have.
-    pub(crate) number: &'static str,
+    pub(crate) number: String,
     pub(crate) caption: String,
     pub(crate) figure: Figure,
 }
@@ -54,14 +56,14 @@ pub(crate) struct Picture {
 impl Picture {
     /// The figure as a block; its first sentence is the picture's title too.
     pub(crate) fn block(
-        file: &'static str,
-        number: &'static str,
+        file: impl Into<String>,
+        number: impl Into<String>,
         caption: impl Into<String>,
         figure: Figure,
     ) -> Block {
         Block::Picture(Box::new(Self {
-            file,
-            number,
+            file: file.into(),
+            number: number.into(),
             caption: caption.into(),
             figure,
         }))

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use anyhow::{Context, Result, bail, ensure};
 use pdm::Cluster;
 use rayon::prelude::*;
-use sim::{Circuit, Step, Streams};
+use sim::{Circuit, Setting, Step, Streams};
 
 use crate::config::{Config, ControllerKind};
 use crate::dataset::DataSet;
@@ -54,6 +54,21 @@ impl Variant {
             Self::Wall50 => Some(("wall.max_error_m", "0.05")),
             Self::Slip100 => Some(("slip.level", "1.0")),
         }
+    }
+
+    /// Its place among the runs of a draw; of the standard one the first.
+    fn place(self) -> usize {
+        let other = Self::OTHERS.iter().position(|other| *other == self);
+        other.map_or(0, |place| 2 * RUNS + place)
+    }
+
+    /// This variant of a model.
+    fn setup(self, standard: &Config, circuit: &Arc<Circuit>) -> Result<Setup> {
+        let config = match self.setting() {
+            Some((key, value)) => standard.with(key, value)?,
+            None => standard.clone(),
+        };
+        Ok(Setup::new(&config, Arc::clone(circuit), None)?)
     }
 
     /// Its name in tables and figures.
@@ -286,6 +301,44 @@ impl Study {
         })
     }
 
+    /// For each draw one run of each variant with effects added to the model, which act as in measured run `run`.
+    ///
+    /// The random streams are those of the study's own runs, so that draws differ by the effects alone.
+    ///
+    /// # Errors
+    /// What the simulator refuses, a run without a lap, an interrupt.
+    pub(crate) fn with_effects(
+        &self,
+        seed: u64,
+        effects: &[Setting],
+        run: usize,
+        variants: &[Variant],
+        progress: &Progress,
+    ) -> Result<Vec<Vec<Cluster>>> {
+        let setup = |variant: &Variant| -> Result<Setup> {
+            let mut setup = variant.setup(&self.standard, &self.measured.circuit)?;
+            setup.model.effects.extend_from_slice(effects);
+            Ok(setup)
+        };
+        let setups = variants.iter().map(setup).collect::<Result<Vec<_>>>()?;
+        let cluster = |draw: usize, place: usize| -> Result<Cluster> {
+            interrupt::check()?;
+            let Setup { model, scene } = &setups[place];
+            let name = variants[place].name();
+            let streams = Streams {
+                seed,
+                run: (draw * Self::RUNS_PER_DRAW + variants[place].place()) as u64,
+            };
+            let drive = sim::drive(&scene.world(model, run)?, streams, self.laps, |_| {})?;
+            progress.tick(1);
+            lap_cluster(name, &laps::simulated(name, 0, &drive, self.laps))
+        };
+        (0..self.draws.len())
+            .into_par_iter()
+            .map(|draw| (0..variants.len()).map(|place| cluster(draw, place)).collect())
+            .collect()
+    }
+
     /// The course and its gates.
     pub(crate) fn circuit(&self) -> &Circuit {
         &self.measured.circuit
@@ -325,13 +378,12 @@ impl Study {
 
 /// The standard simulation, the rule-based one, and the other variants.
 fn setups(standard: &Config, rule_based: &Config, circuit: &Arc<Circuit>) -> Result<Vec<Setup>> {
-    let of = |config: &Config| Ok(Setup::new(config, Arc::clone(circuit), None)?);
-    let variant = |variant: Variant| match variant.setting() {
-        Some((key, value)) => of(&standard.with(key, value)?),
-        None => of(standard),
-    };
-    let others = Variant::OTHERS.into_iter().map(variant);
-    [of(standard), of(rule_based)].into_iter().chain(others).collect()
+    let of = |variant: Variant, config| variant.setup(config, circuit);
+    let others = Variant::OTHERS.into_iter().map(|variant| of(variant, standard));
+    [of(Variant::Standard, standard), of(Variant::Standard, rule_based)]
+        .into_iter()
+        .chain(others)
+        .collect()
 }
 
 /// The runs of a draw in the order of [`Draw`].
@@ -367,12 +419,16 @@ fn simulate(plan: &Plan<'_>, streams: Streams, laps: usize) -> Result<Simulated>
         seen.iter().filter(inside).map(|(_, at)| *at).collect()
     };
     Ok(Simulated {
-        cluster: Cluster::new(&plan.name, &run.offsets_m())
-            .with_context(|| format!("simulation `{}`: no lap closed", plan.name))?,
+        cluster: lap_cluster(&plan.name, &run)?,
         contacts: drive.contacts,
         paths: run.laps.iter().take(DRAWN_LAPS).map(path).collect(),
         run,
     })
+}
+
+/// The laps of a simulated run.
+fn lap_cluster(name: &str, run: &SampledRun) -> Result<Cluster> {
+    Cluster::new(name, &run.offsets_m()).with_context(|| format!("simulation `{name}`: no lap closed"))
 }
 
 #[cfg(test)]

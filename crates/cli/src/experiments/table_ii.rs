@@ -12,7 +12,7 @@ use super::study::{Study, Variant};
 use crate::figures::{self, Shown, line, map, measured, paths, simulated, single, walls};
 use crate::setup;
 
-const VARIANTS: [Variant; 2] = [Variant::Standard, Variant::OriginalSensor];
+pub(super) const VARIANTS: [Variant; 2] = [Variant::Standard, Variant::OriginalSensor];
 const NAMES: [&str; 2] = ["improved sensor", "original sensor"];
 
 /// The experiment: one PDM of all measured runs and one simulated run with each sensor model.
@@ -20,7 +20,7 @@ pub(crate) fn outcome(study: &Study) -> Result<Outcome> {
     let runs = study.real.len();
     let all: Vec<usize> = (0..runs).collect();
     let comparison = Comparison::new(&study.clusters(&all, &VARIANTS))?;
-    let distances = table_ii(study, &comparison);
+    let distances = table_ii(study, std::slice::from_ref(&comparison));
     let responses = responses(study)?;
     let mut claims = claims(study, &comparison, &distances);
     claims.push(response_claim(&responses));
@@ -70,15 +70,15 @@ pub(crate) fn outcome(study: &Study) -> Result<Outcome> {
     })
 }
 
-/// Table II beside the paper's.
-fn table_ii(study: &Study, comparison: &Comparison) -> Distances {
+/// Table II beside the paper's, from one comparison for all runs or one for each.
+pub(super) fn table_ii(study: &Study, comparisons: &[Comparison]) -> Distances {
     let runs = study.real.len();
     let row = |(place, (key, paper)): (usize, (&str, published::Row))| Row {
         key: String::from(key),
         name: NAMES[place].into(),
         paper: Some(paper),
         here: (0..runs)
-            .map(|run| comparison.distance(run, runs + place))
+            .map(|run| comparisons[run % comparisons.len()].distance(run, runs + place))
             .collect(), // eq. 8
     };
     Distances {

@@ -15,7 +15,7 @@ use crate::figures::{self, MM, Shown, across, line, map, measured, simulated, wa
 use crate::table::Table;
 
 /// In the order of [`WALLS`]: 1, 5, 10 and 50 mm.
-const VARIANTS: [Variant; 4] = [
+pub(super) const VARIANTS: [Variant; 4] = [
     Variant::Wall1,
     Variant::Standard,
     Variant::Wall10,
@@ -28,7 +28,7 @@ pub(crate) fn outcome(study: &Study) -> Result<Outcome> {
     let runs = study.real.len();
     let all: Vec<usize> = (0..runs).collect();
     let comparison = Comparison::new(&study.clusters(&all, &VARIANTS))?;
-    let distances = table_iii(study, &comparison);
+    let distances = table_iii(study, std::slice::from_ref(&comparison));
     let shapes = Shapes::new(study, &comparison);
     let claims = [claims(study, &comparison), shapes.claims(study)].concat();
     let blocks = vec![
@@ -69,15 +69,15 @@ pub(crate) fn outcome(study: &Study) -> Result<Outcome> {
     })
 }
 
-/// Table III beside the paper's.
-fn table_iii(study: &Study, comparison: &Comparison) -> Distances {
+/// Table III beside the paper's, from one comparison for all runs or one for each.
+pub(super) fn table_iii(study: &Study, comparisons: &[Comparison]) -> Distances {
     let runs = study.real.len();
     let row = |(place, (error_m, paper, _)): (usize, (f64, published::Row, usize))| Row {
         key: error_m.to_string(),
         name: NAMES[place].into(),
         paper: Some(paper),
         here: (0..runs)
-            .map(|run| comparison.distance(run, runs + place))
+            .map(|run| comparisons[run % comparisons.len()].distance(run, runs + place))
             .collect(), // eq. 8
     };
     Distances {

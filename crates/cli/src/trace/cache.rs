@@ -1,10 +1,11 @@
 //! Signatures of a model, kept between calls.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use diagnose::Atlas;
 
+use crate::args::Signatures;
 use crate::output::sha256;
 
 /// A folder of atlases, each named after what decides its contents. A file that does not hold what it says is made anew.
@@ -13,13 +14,12 @@ pub(crate) struct Cache(Option<PathBuf>);
 
 impl Cache {
     /// The cache in a folder; the platform's own if none is given; none at all if it is not wanted.
-    pub(crate) fn new(folder: Option<&Path>, wanted: bool) -> Self {
+    pub(crate) fn new(asked: &Signatures) -> Self {
         let place = || {
-            folder
-                .map(Path::to_owned)
-                .or_else(|| directories().map(|dir| dir.join("lapwing")))
+            let own = || directories().map(|dir| dir.join("lapwing"));
+            asked.cache.clone().or_else(own)
         };
-        Self(wanted.then(place).flatten())
+        Self((!asked.no_cache).then(place).flatten())
     }
 
     fn file(&self, key: &str) -> Option<PathBuf> {

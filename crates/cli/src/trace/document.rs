@@ -184,7 +184,7 @@ fn by(effect: &Candidate) -> Value {
 }
 
 /// The parameters with their intervals.
-fn parameters(effect: &Candidate) -> Vec<Value> {
+pub(crate) fn parameters(effect: &Candidate) -> Vec<Value> {
     let params = effect.setting.spec.params;
     let errors = &effect.standard_errors;
     let entry = |param: &sim::Param, name: String, values: Value, low: Value, high: Value| {

@@ -18,10 +18,10 @@ use sim::{Pattern, Setting};
 
 use answer::{FromLogs, from_logs, log_rows};
 pub(crate) use cache::Cache;
-pub(crate) use document::document;
+pub(crate) use document::{document, parameters};
 pub(crate) use error::{MeanLaps, mean};
 use next::{Experiment, experiments};
-pub(crate) use pages::{gates_csv, sections, summary};
+pub(crate) use pages::{digest, gates_csv, sections, summary};
 use recording::{Recording, Seeds, held_out, simulate_all};
 
 use crate::config::{Config, ModelFile};

@@ -51,6 +51,11 @@ pub(crate) fn sections(trace: &Trace) -> Result<Vec<Section>> {
     ])
 }
 
+/// A trace as a part of another report.
+pub(crate) fn digest(trace: &Trace) -> Vec<Block> {
+    [diagnosis(trace), residual(trace), candidates(trace)].concat()
+}
+
 /// The answer in sentences.
 pub(crate) fn summary(trace: &Trace) -> String {
     let diagnosis = &trace.answer;
