@@ -13,6 +13,8 @@ pub use answer::{Answer, Cause, Explanation, Verdict};
 pub use candidate::Candidate;
 pub use corners::{Corners, other_cuts};
 pub use error::Error;
-pub use laps::{Atlas, FourNumbers, LapDiagnosis, Quadratic, Simulate};
-pub use log::{Channel, Decided, LogDiagnosis, LogRow, diagnose_logs};
+pub use laps::{
+    Atlas, Baselines, Detectable, FourNumbers, LapDiagnosis, Quadratic, Rival, Simulate, separations,
+};
+pub use log::{Channel, Decided, LogDiagnosis, LogRow, diagnose_logs, log_separation};
 pub use response_fit::{Estimate, ResponseFit};

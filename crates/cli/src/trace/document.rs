@@ -1,11 +1,14 @@
 //! `trace.json`.
 
-use diagnose::{Candidate, Cause, Decided, Explanation, FourNumbers, Quadratic, Verdict};
+use diagnose::{
+    Candidate, Cause, Channel, Decided, Detectable, Explanation, FourNumbers, Quadratic, Verdict,
+};
 use serde_json::{Value, json};
 use sim::Pattern;
 
 use super::Trace;
 use super::answer::{FromLogs, rivals};
+use super::next::Experiment;
 
 /// Half width of a 95 % interval in standard errors.
 const HALF_WIDTH_95: f64 = 1.96;
@@ -28,14 +31,42 @@ pub(crate) fn document(trace: &Trace) -> Value {
             "held_out": trace.held_out().map(|run| run.name.clone()).collect::<Vec<_>>(),
         },
         "candidates": answer.explanations.iter().map(candidate).collect::<Vec<_>>(),
-        "separate_with": Vec::<Value>::new(),
+        "separate_with": trace.experiments.iter().map(experiment).collect::<Vec<_>>(),
+        "detectable": trace.detectable.iter().map(detectable).collect::<Vec<_>>(),
         "remarks": trace.remarks,
         "laps_simulated": trace.laps_simulated,
     });
+    if let Some(baselines) = &trace.baselines {
+        document["baselines"] = json!({
+            "mean_lap_rms": baselines.mean_lap_rms, "two_modes": baselines.two_modes,
+        });
+    }
     if let Some(found) = &trace.from_logs {
         document["logs"] = logs(found);
     }
     document
+}
+
+/// An experiment with what it would tell.
+fn experiment(experiment: &Experiment) -> Value {
+    let declared: serde_json::Map<String, Value> = (experiment.declared.iter())
+        .map(|(key, value)| ((*key).to_owned(), json!(value)))
+        .collect();
+    let against: Vec<Value> = (experiment.separations.iter())
+        .map(|(name, sigma)| json!({ "name": name, "sigma": sigma }))
+        .collect();
+    json!({
+        "experiment": experiment.name, "declared": declared, "against": against,
+        "sigma": experiment.least(), "laps": experiment.laps, "laps_for_5_sigma": experiment.laps_needed(),
+    })
+}
+
+/// The smallest sizes of an effect that these data show.
+fn detectable(detectable: &Detectable) -> Value {
+    json!({
+        "name": detectable.spec.name, "label": detectable.label, "parameter": detectable.parameter,
+        "unit": detectable.unit, "below": detectable.below, "above": detectable.above,
+    })
 }
 
 /// What the logs say by themselves, and whether the laps agree.
@@ -50,8 +81,18 @@ fn logs(found: &FromLogs) -> Value {
     json!({
         "decide": { "verdict": decide, "effects": effects, "commands_unexplained": share },
         "p": logs.p, "control_steps": logs.steps,
+        "innovations": logs.channels.iter().map(channel).collect::<Vec<_>>(),
+        "walls_cut_at": { "points_per_span": logs.corners.per_span, "before": logs.corners.before },
         "confirmed_by_laps": found.confirmed,
         "laps_after": found.after.as_ref().map(four),
+    })
+}
+
+/// How white the filter's innovations of one measured number are: 1, 3 and 0 under the model.
+fn channel(channel: &Channel) -> Value {
+    json!({
+        "count": channel.count, "mean_square": channel.mean_square, "kurtosis": channel.kurtosis,
+        "correlation": channel.correlation,
     })
 }
 

@@ -4,20 +4,24 @@ mod answer;
 mod cache;
 mod document;
 mod error;
+mod limits;
+mod next;
 mod pages;
 mod recording;
+mod unnamed;
 
 use std::path::Path;
 
 use anyhow::{Result, ensure};
-use diagnose::{Answer, Atlas, FourNumbers, Simulate};
+use diagnose::{Answer, Atlas, Baselines, Detectable, FourNumbers, Simulate};
 use sim::{Pattern, Setting};
 
 use answer::{FromLogs, from_logs, log_rows};
 pub(crate) use cache::Cache;
 pub(crate) use document::{document, parameters};
 pub(crate) use error::{MeanLaps, mean};
-pub(crate) use pages::{digest, sections, summary};
+use next::{Experiment, experiments};
+pub(crate) use pages::{digest, gates_csv, sections, summary};
 use recording::{Recording, Seeds, held_out, simulate_all};
 
 use crate::config::{Config, ModelFile};
@@ -41,10 +45,16 @@ pub(crate) struct Trace {
     pub(crate) answer: Answer,
     /// What the robot's logs say, where there are logs.
     pub(crate) from_logs: Option<FromLogs>,
+    /// What simpler ways of naming say of the laps, where there are no logs.
+    pub(crate) baselines: Option<Baselines>,
     /// The error, recording by recording.
     pub(crate) errors: Vec<Errors>,
     /// What a reader must know of the data.
     pub(crate) remarks: Vec<String>,
+    /// Experiments that would tell the answer from what these data do not tell it from.
+    pub(crate) experiments: Vec<Experiment>,
+    /// The smallest sizes of effects that these data show; of laps without logs.
+    pub(crate) detectable: Vec<Detectable>,
     pub(crate) laps_simulated: u64,
 }
 
@@ -100,6 +110,7 @@ impl Trace {
             })
             .collect::<Result<Vec<_>>>()?;
         let atlas = Atlas::join(parts).expect("at least one data set is measured");
+        let baselines = logged.is_none().then(|| atlas.baselines(&laps)).transpose()?;
         let progress = session.progress("naming the effect", 1);
         let (residual, answer, from_logs) = match logged {
             Some((recording, rows)) => {
@@ -119,15 +130,20 @@ impl Trace {
         drop(progress);
         let errors = errors(&recordings, &answer, unseen, seed)?;
         interrupt::check()?;
-        Ok(Self {
+        let mut trace = Self {
             remarks: remarks(&recordings),
             laps_simulated: laps_simulated(&recordings, &atlas, from_logs.is_some()),
+            detectable: atlas.detectable(),
+            experiments: Vec::new(),
             recordings,
             residual,
             answer,
             from_logs,
+            baselines,
             errors,
-        })
+        };
+        trace.experiments = experiments(&trace, seed)?;
+        Ok(trace)
     }
 
     /// The declared model with the effects of the answer.

@@ -2,10 +2,12 @@
 
 use anyhow::Result;
 use chart::{Color, ColorMap, ColorScale, Dash, Figure, Mark, Shape, Style};
-use diagnose::{Explanation, FourNumbers, Verdict};
+use diagnose::{Cause, Explanation, FourNumbers, Verdict};
 use sim::Pattern;
 use track::Lap;
 
+use super::limits::{limits, next_experiment, next_in_words, stages};
+use super::unnamed::unnamed;
 use super::{MeanLaps, Trace, mean};
 use crate::experiments::{Block, Picture, Section};
 use crate::figures::{MM, across, crossings, line, map, single, walls};
@@ -31,8 +33,20 @@ pub(crate) fn sections(trace: &Trace) -> Result<Vec<Section>> {
             blocks: candidates(trace),
         },
         Section {
+            heading: "Stage by stage".into(),
+            blocks: stages(trace),
+        },
+        Section {
             heading: "Before and after".into(),
             blocks: before_and_after(trace),
+        },
+        Section {
+            heading: "The next experiment".into(),
+            blocks: next_experiment(trace),
+        },
+        Section {
+            heading: "What cannot be seen".into(),
+            blocks: limits(trace),
         },
     ])
 }
@@ -50,9 +64,7 @@ pub(crate) fn summary(trace: &Trace) -> String {
         (Verdict::Faithful, _) => {
             "Faithful: the laps do not depart from the declared model by more than chance allows.".to_owned()
         }
-        (Verdict::Unexplained, _) | (_, None) => {
-            "Unexplained: the laps depart from the declared model, and no effect in the registry explains it. No name would be honest.".to_owned()
-        }
+        (Verdict::Unexplained, _) | (_, None) => unexplained(trace),
         (v, Some(answer)) => {
             let what: Vec<String> = answer.effects.iter().map(describe).collect();
             let rest = if v == Verdict::Explained && answer.remainder_p < 0.001 {
@@ -64,7 +76,11 @@ pub(crate) fn summary(trace: &Trace) -> String {
             };
             let mut word = v.name().to_owned();
             word[..1].make_ascii_uppercase();
-            format!("{word}: {}; this explains {:.1} % of the excess.{rest}", what.join(" and "), 100.0 * answer.share)
+            format!(
+                "{word}: {}; this explains {:.1} % of the excess.{rest}",
+                what.join(" and "),
+                100.0 * answer.share
+            )
         }
     };
     let rivals: Vec<String> = diagnosis.explanations[..diagnosis.indistinguishable]
@@ -77,12 +93,56 @@ pub(crate) fn summary(trace: &Trace) -> String {
     } else {
         format!(" These laps do not tell it apart from: {}.", rivals.join("; "))
     };
+    let next = next_in_words(trace).map_or(String::new(), |next| format!("\n{next}"));
     format!(
-        "{said}{alternatives}\nError of the mean lap on held-out runs: {:.2} mm before, {:.2} mm after; {:.2} mm would be chance.",
+        "{said}{alternatives}{next}\nError of the mean lap on held-out runs: {:.2} mm before, {:.2} mm after; {:.2} mm would be chance.",
         MM * trace.mean_m(|e| &e.before_m),
         MM * trace.mean_m(|e| &e.after_m),
         MM * trace.mean_m(|e| &e.floor_m)
     )
+}
+
+/// Why nothing is claimed.
+fn unexplained(trace: &Trace) -> String {
+    if let Some(found) = trace.from_logs.as_ref().filter(|found| !found.confirmed) {
+        let said: Vec<String> = (found.logs.answer.explanations.first().iter())
+            .map(|answer| answer.label())
+            .collect();
+        return format!(
+            "Unexplained: the log says {}, and the laps do not agree. Neither is claimed.",
+            if said.is_empty() {
+                "that nothing is missing".to_owned()
+            } else {
+                said.join(", ")
+            }
+        );
+    }
+    let known = trace.answer.cause.as_ref().map(|cause| {
+        format!(
+            " It sits in the {} stage: {} by {}.",
+            cause.stage.name(),
+            cause.acts_on,
+            cause.depends_on
+        )
+    });
+    format!(
+        "Unexplained: the data depart from the declared model, and no effect in the registry explains it. No name would be honest.{}",
+        known.unwrap_or_default()
+    )
+}
+
+/// The mean laps gate by gate as CSV, recording by recording.
+pub(crate) fn gates_csv(trace: &Trace) -> String {
+    let mut csv = String::from("data_set,gate,measured_m,before_m,after_m\n");
+    for (recording, errors) in trace.recordings.iter().zip(&trace.errors) {
+        let laps: Vec<Vec<f64>> = errors.held_out.iter().flat_map(SampledRun::offsets_m).collect();
+        for (gate, measured) in mean(laps.iter()).unwrap_or_default().iter().enumerate() {
+            let (before, after) = (errors.before.mean_m[gate], errors.after.mean_m[gate]);
+            let name = &recording.measured.set.name;
+            csv += &format!("{name},{gate},{measured:.6},{before:.6},{after:.6}\n");
+        }
+    }
+    csv
 }
 
 /// An effect with its size, for a sentence.
@@ -97,6 +157,12 @@ fn describe(effect: &diagnose::Candidate) -> String {
         params.iter().enumerate().map(one).collect::<Vec<_>>().join(", ")
     };
     let name = effect.setting.spec.name;
+    if let Some(cause) = Cause::of(&effect.setting) {
+        return format!(
+            "an effect without a name on the {} that depends on the {}",
+            cause.acts_on, cause.depends_on
+        );
+    }
     match &effect.setting.pattern {
         Pattern::Constant(values) => format!("{name} ({})", list(values, &effect.standard_errors)),
         Pattern::ByTime { start, .. } => format!(
@@ -289,7 +355,9 @@ fn candidates(trace: &Trace) -> Vec<Block> {
             sizes(e),
         ]);
     }
-    vec![Block::Table(table)]
+    let mut blocks = vec![Block::Table(table)];
+    blocks.extend(unnamed(trace));
+    blocks
 }
 
 fn sizes(explanation: &Explanation) -> String {

@@ -82,6 +82,17 @@ impl Recording {
         seeds: Seeds,
         first_run: usize,
     ) -> Option<Vec<Vec<Lap>>> {
+        Self::drive(setup, effects, seeds, &self.shape(), first_run)
+    }
+
+    /// As [`Recording::simulate`], of any shape: `laps` of each run.
+    pub(super) fn drive(
+        setup: &Setup,
+        effects: &[Setting],
+        seeds: Seeds,
+        laps: &[usize],
+        first_run: usize,
+    ) -> Option<Vec<Vec<Lap>>> {
         if interrupt::check().is_err() {
             return None;
         }
@@ -99,7 +110,7 @@ impl Recording {
                 .collect();
             (closed.len() == laps).then_some(closed)
         };
-        self.shape().iter().enumerate().map(run).collect()
+        laps.iter().enumerate().map(run).collect()
     }
 }
 

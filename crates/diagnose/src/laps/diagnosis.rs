@@ -9,7 +9,7 @@ use super::tests_of_fit::FourNumbers;
 use crate::{Answer, Cause, Error, Explanation, Verdict};
 
 /// Score of the best probe from which a data set counts as departing from the declared model, whatever the omnibus says.
-const ALARM_SCORE: f64 = 7.0;
+pub(super) const ALARM_SCORE: f64 = 7.0;
 /// Omnibus probability below which it does.
 const ALARM_P: f64 = 0.002;
 /// Probability of the fit below which a remainder is significant.
@@ -78,8 +78,10 @@ impl Atlas {
         let best = found.first().map(|best| &best.explanation);
         let verdict = best.map_or(Verdict::Unexplained, verdict_of);
         let indistinguishable = best.map_or(0, |best| {
+            // Candidates share their draws, so that half of the simulation's error is common to them.
+            let behind = ALTERNATIVE + 0.5 * found[0].gain_error;
             let alike =
-                |e: &Explanation| e.score > best.score - ALTERNATIVE && e.effects.len() == best.effects.len();
+                |e: &Explanation| e.score > best.score - behind && e.effects.len() == best.effects.len();
             found.iter().take_while(|f| alike(&f.explanation)).count()
         });
         let answer = found.first().filter(|_| verdict != Verdict::Unexplained);

@@ -134,6 +134,20 @@ impl Scatter {
         Self::with(recordings, second, DMatrix::zeros(size, size))
     }
 
+    /// As [`Scatter::of`] from few recordings: the second-order numbers are taken to be independent of each other.
+    pub(super) fn of_few<'a>(recordings: impl Iterator<Item = &'a Recording> + Clone) -> Option<Self> {
+        let sets = recordings.clone().count() as f64;
+        let mean = Expected::of(recordings.clone(), true).second;
+        let mut variances = DVector::zeros(SECOND);
+        for recording in recordings.clone() {
+            let deviation = &recording.second - &mean;
+            variances += deviation.component_mul(&deviation) / (sets - 1.0);
+        }
+        let size = recordings.clone().next()?.scatter.nrows();
+        let second = DMatrix::from_diagonal(&variances).cholesky()?;
+        Self::with(recordings, second, DMatrix::zeros(size, size))
+    }
+
     /// The scatter of the laps of these recordings, with another's scatter of the second-order numbers, which few data sets
     /// do not determine.
     pub(super) fn of_laps<'a>(
@@ -183,6 +197,17 @@ impl Scatter {
     /// A run's mean lap in units of a lap's scatter and of what the declaration leaves open.
     pub(super) fn whiten_mean(&self, mean: &DVector<f64>) -> DVector<f64> {
         whiten(&self.mean, mean)
+    }
+
+    /// The mean lap of [`Scatter::whiten_mean`].
+    pub(super) fn unwhiten_mean(&self, white: &DVector<f64>) -> DVector<f64> {
+        self.mean.l() * white
+    }
+
+    /// The covariance of one lap.
+    pub(super) fn of_lap(&self) -> DMatrix<f64> {
+        let l = self.lap.l();
+        &l * l.transpose()
     }
 
     /// A vector of one lap's covariance in units of it.

@@ -1,6 +1,8 @@
 //! Diagnosis from laps that the camera saw.
 
 mod atlas;
+mod baseline;
+mod detectable;
 mod diagnosis;
 mod expectation;
 mod groups;
@@ -11,9 +13,13 @@ mod probe;
 mod refine;
 mod screen;
 mod search;
+mod separation;
 mod summary;
 mod tests_of_fit;
 
 pub use atlas::{Atlas, Simulate};
+pub use baseline::Baselines;
+pub use detectable::Detectable;
 pub use diagnosis::LapDiagnosis;
+pub use separation::{Rival, separations};
 pub use tests_of_fit::{FourNumbers, Quadratic};

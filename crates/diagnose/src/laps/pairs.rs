@@ -72,7 +72,7 @@ impl Atlas {
                 };
                 ScreenedPair {
                     hypothesis,
-                    score: 0.5 * gain - price(fitted, laps),
+                    score: 0.5 * gain - price(fitted, laps) - self.choice(a) - self.choice(b),
                 }
             })
             .collect();

@@ -59,6 +59,16 @@ impl Probe {
         Setting::constant(self.spec, values)
     }
 
+    /// Whether the effect itself is a change in time.
+    pub(super) fn drifts(&self) -> bool {
+        self.spec.params[self.size_index()].name == "per_s"
+    }
+
+    /// Which parameter sizes it.
+    pub(super) fn size_index(&self) -> usize {
+        self.free[0].0
+    }
+
     /// The values where nothing is done.
     pub(super) fn origin(&self) -> &[f64] {
         &self.origin

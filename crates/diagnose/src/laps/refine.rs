@@ -16,7 +16,7 @@ use crate::Error;
 const ROUND_SETS: u64 = 10;
 
 /// Data sets simulated at the end.
-const FINAL_SETS: u64 = 48;
+const FINAL_SETS: u64 = 32;
 
 /// A hypothesis at its most likely sizes.
 #[derive(Debug, Clone)]
@@ -30,6 +30,8 @@ pub(super) struct Refined {
     pub(super) gain: f64,
     /// `gain` less the price of the fitted numbers.
     pub(super) score: f64,
+    /// Standard deviation of the gain for the simulation's own error.
+    pub(super) gain_error: f64,
 }
 
 impl Refined {
@@ -40,6 +42,7 @@ impl Refined {
 }
 
 /// A hypothesis simulated.
+#[derive(Clone)]
 struct Evaluated {
     expectation: Expectation,
     /// Variance of the expectation in units of a data set's own.
@@ -106,7 +109,7 @@ impl Atlas {
         let (moves, covariance) = nearest(&local.columns, &target, freedoms);
         let left = left_of(&local.columns, &target, &moves).norm_squared() / (1.0 + local.error);
         let gain = self.gain(data, left, &local.scatter);
-        let score = hypothesis.worth(gain) - price(freedoms.len(), self.layout.total_laps());
+        let score = hypothesis.worth(gain) - self.price_of(hypothesis);
         let settled = (0..moves.len()).all(|i| moves[i].abs() < 0.5 * covariance[(i, i)].sqrt());
         let by: Vec<(Freedom, f64)> = freedoms.iter().copied().zip(moves.iter().copied()).collect();
         *hypothesis = hypothesis.moved(self, &by);
@@ -204,6 +207,12 @@ impl Atlas {
         0.5 * (before - left - wider)
     }
 
+    /// What a hypothesis pays for its fitted numbers and for the choice of its probes.
+    fn price_of(&self, hypothesis: &Hypothesis) -> f64 {
+        let choices: f64 = hypothesis.parts.iter().map(|part| self.choice(part.probe)).sum();
+        price(hypothesis.freedoms(self).len(), self.layout.total_laps()) + choices
+    }
+
     /// The scatter of simulated data sets, recording by recording.
     fn scatter_of<'a>(&self, summaries: impl Iterator<Item = &'a Summary> + Clone) -> Option<Vec<Scatter>> {
         let of = |(g, declared): (usize, &Scatter)| {
@@ -237,8 +246,9 @@ impl Atlas {
         let scatter = self.scatter_of(end.summaries.iter())?;
         let residual = white(&scatter, &self.layout, data, &end.expectation) / (1.0 + end.error).sqrt();
         let gain = self.gain(data, residual.norm_squared(), &scatter);
-        let score = hypothesis.worth(gain) - price(errors.len(), self.layout.total_laps());
+        let score = hypothesis.worth(gain) - self.price_of(&hypothesis);
         Some(Refined {
+            gain_error: (residual.norm_squared() * end.error).sqrt(),
             hypothesis,
             errors,
             residual,
@@ -414,7 +424,15 @@ impl Atlas {
                 self.evaluate(simulate, &moved, ROUND_SETS)
                     .map(|evaluated| (by, evaluated))
             };
-            let (down, up) = (at(-1.0)?, at(1.0)?);
+            // Where the robot crashes on one side, the other one tells the slope.
+            let nowhere = |side: Option<(Vec<f64>, Evaluated)>| {
+                side.unwrap_or_else(|| (vec![0.0; group.len()], center.clone()))
+            };
+            let (down, up) = (at(-1.0), at(1.0));
+            if down.is_none() && up.is_none() {
+                return None;
+            }
+            let (down, up) = (nowhere(down), nowhere(up));
             sides.push((group, down, up));
         }
         let all = sides

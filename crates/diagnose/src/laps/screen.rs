@@ -2,6 +2,8 @@
 
 use std::ops::Range;
 
+use sim::UNLISTED;
+
 use super::atlas::{Atlas, White};
 use super::hypothesis::{Hypothesis, Part, Shape};
 use super::layout::ramp_norm;
@@ -12,16 +14,6 @@ pub(super) struct Screened {
     pub(super) hypothesis: Hypothesis,
     /// Half the squared distance to the residual that is gained, less the price of its parameters.
     pub(super) score: f64,
-}
-
-impl Screened {
-    /// Whether its size is the same always.
-    pub(super) fn is_constant(&self) -> bool {
-        self.hypothesis
-            .parts
-            .iter()
-            .all(|part| part.shape == Shape::Constant)
-    }
 }
 
 /// Half the logarithm of the number of laps for each fitted number (Schwarz 1978).
@@ -73,6 +65,22 @@ impl Atlas {
         nodes
     }
 
+    /// The price of having chosen one probe among those of its effect: the logarithm of how many there are, less what is
+    /// fitted of the choice.
+    pub(super) fn choice(&self, probe: usize) -> f64 {
+        let chosen = &self.probes[probe];
+        let alike = self
+            .probes
+            .iter()
+            .filter(|p| p.spec == chosen.spec && *p.spec != UNLISTED)
+            .count();
+        if chosen.free.len() == 2 {
+            // A direction is fitted.
+            return 0.0;
+        }
+        (alike.max(1) as f64).ln()
+    }
+
     /// What a size that grows by one from lap to lap does to the trends, by what it does to the mean laps.
     fn change_per_lap(&self, tangent: &White) -> White {
         let mut change = White::zeros(tangent.len());
@@ -121,6 +129,8 @@ impl Atlas {
                 let sizes = parts.into_iter().map(|part| part.0).collect();
                 (sizes, action, p.free.len() - 1 + runs)
             }
+            // What changes in time by itself is no candidate for a change of that change.
+            Shape::ByTime if p.drifts() => return None,
             Shape::ByTime => {
                 let (s, action) = nearest(nodes, residual, everything)?;
                 let change = self.change_per_lap(&tangent(nodes, s));
@@ -130,7 +140,7 @@ impl Atlas {
             }
         };
         let gain = residual.norm_squared() - (residual - &action).norm_squared();
-        let score = worth(0.5 * gain, shape) - price(fitted, self.layout.total_laps());
+        let score = worth(0.5 * gain, shape) - price(fitted, self.layout.total_laps()) - self.choice(probe);
         Some(Screened {
             hypothesis: Hypothesis {
                 parts: vec![Part::screened(self, probe, shape, &size_at)],
@@ -158,7 +168,11 @@ pub(super) fn worth(gain: f64, shape: Shape) -> f64 {
 
 /// The point of a path that is nearest to the residual in some entries, and its size. Beyond its ends the path goes on
 /// straight for [`BEYOND`] of its last piece.
-fn nearest(nodes: &[(f64, White)], residual: &White, entries: Range<usize>) -> Option<(f64, White)> {
+pub(super) fn nearest(
+    nodes: &[(f64, White)],
+    residual: &White,
+    entries: Range<usize>,
+) -> Option<(f64, White)> {
     let (first, count) = (entries.start, entries.len());
     let target = residual.rows(first, count);
     let mut best: Option<(f64, f64, White)> = None;

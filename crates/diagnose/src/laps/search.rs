@@ -16,6 +16,8 @@ use crate::{Candidate, Explanation};
 pub(super) struct Found {
     pub(super) hypothesis: Hypothesis,
     pub(super) explanation: Explanation,
+    /// Standard deviation of its log-likelihood for the simulation's own error.
+    pub(super) gain_error: f64,
 }
 
 /// A search for explanations of one data set.
@@ -28,7 +30,7 @@ pub(super) struct Search<'a> {
 
 /// Rounds of a descent, each with the log-likelihood, and the share of the best one's, by which what lies behind then does
 /// not come back.
-const BEHIND: [(f64, f64); 3] = [(50.0, 0.2), (25.0, 0.05), (15.0, 0.015)];
+const BEHIND: [(f64, f64); 3] = [(50.0, 0.2), (30.0, 0.05), (20.0, 0.015)];
 
 impl Search<'_> {
     /// The best single effects, tried to the end, best first.
@@ -50,7 +52,7 @@ impl Search<'_> {
 
     /// The best pairs, tried to the end.
     pub(super) fn pairs(&self) -> Vec<Found> {
-        const PAIRS: usize = 8;
+        const PAIRS: usize = 6;
         let pairs = self.atlas.screen_pairs(self.residual, PAIRS);
         self.try_all(pairs.iter().map(|pair| &pair.hypothesis))
     }
@@ -64,7 +66,7 @@ impl Search<'_> {
             let screened = left.map(|left| self.atlas.screen(&left)).unwrap_or_default();
             let others = shortlist(&screened)
                 .into_iter()
-                .filter(|s| s.is_constant() && !self.shares_effect(s, start));
+                .filter(|s| !self.shares_effect(s, start));
             others
                 .take(FURTHER)
                 .map(|other| start.hypothesis.with(&other.hypothesis))
@@ -83,16 +85,24 @@ impl Search<'_> {
     /// Causes without a name: the groups of basis functions that explain most with fewest coefficients, tried to the end.
     pub(super) fn unnamed(&self) -> Vec<Found> {
         let starts = self.atlas.screen_groups(self.simulate, self.residual);
-        self.try_all(starts.iter())
+        self.try_rounds(starts.iter(), &BEHIND[1..])
     }
 
     /// Descends from every hypothesis round by round, dropping those that fall behind, then settles those that may still be
     /// the best.
     fn try_all<'h>(&self, hypotheses: impl Iterator<Item = &'h Hypothesis>) -> Vec<Found> {
+        self.try_rounds(hypotheses, &BEHIND)
+    }
+
+    fn try_rounds<'h>(
+        &self,
+        hypotheses: impl Iterator<Item = &'h Hypothesis>,
+        rounds: &[(f64, f64)],
+    ) -> Vec<Found> {
         let mut alive: Vec<Descent> = hypotheses
             .map(|start| Descent::start(self.atlas, start))
             .collect();
-        for behind in BEHIND {
+        for behind in rounds {
             alive = (alive.into_par_iter())
                 .filter_map(|descent| self.atlas.descend(self.simulate, self.data, descent))
                 .collect();
@@ -127,6 +137,7 @@ impl Search<'_> {
         let excess = |squares: f64| squares - self.residual.len() as f64;
         let remainder = FourNumbers::new(&refined.residual, &atlas.layout);
         Found {
+            gain_error: refined.gain_error,
             hypothesis: refined.hypothesis.clone(),
             explanation: Explanation {
                 effects: effects.into_iter().map(|(_, candidate)| candidate).collect(),

@@ -102,6 +102,8 @@ pub fn diagnose_logs(model: &Model, scene: &Scene, runs: &[&[LogRow]]) -> Result
 
 /// A probability below which something is there: one false alarm in a hundred data sets.
 const ALARM: f64 = 0.01;
+/// Share of a gain that faults of the model may take: at very high signal none is exact.
+const FAULTS: f64 = 0.01;
 /// A probability below which a remainder is significant.
 const SIGNIFICANT_P: f64 = 1e-3;
 /// Explanations within this log-likelihood of the best are alternatives.
@@ -177,13 +179,50 @@ impl<'a> Search<'a> {
             return None;
         }
         let list = self.promising(shortlist(&leads, &self.variants, 8));
-        self.found = (list.par_iter())
-            .filter_map(|lead| pursue(&self.evidence, &self.variants[lead.variant], lead, &self.base))
-            .collect();
+        self.found = self.pursued(&list);
         self.sort();
         self.accept_noise(noise);
         self.sort();
         Some(leads)
+    }
+
+    /// The leads refined: a few steps each, then to the end those that may still be the best.
+    fn pursued(&self, list: &[Lead]) -> Vec<Refined> {
+        const FIRST_STEPS: usize = 2;
+        const STEPS: usize = 8;
+        /// Log-likelihood, and share of the best one's, by which what lies behind after the first steps does not come back.
+        const BEHIND: (f64, f64) = (30.0, 0.06);
+        let pursue = |lead: &Lead, steps| {
+            pursue(
+                &self.evidence,
+                &self.variants[lead.variant],
+                lead,
+                &self.base,
+                steps,
+            )
+        };
+        let first: Vec<(&Lead, Refined)> = (list.par_iter())
+            .filter_map(|lead| Some((lead, pursue(lead, FIRST_STEPS)?)))
+            .collect();
+        let best = first
+            .iter()
+            .map(|(_, refined)| refined.score())
+            .fold(0.0, f64::max);
+        first
+            .into_par_iter()
+            .map(|(lead, refined)| {
+                let behind = refined.score() < best - BEHIND.0.max(BEHIND.1 * best);
+                if behind || refined.settings.iter().all(jumps) {
+                    return refined;
+                }
+                match lead.by {
+                    By::Run => pursue(lead, STEPS).unwrap_or(refined),
+                    By::Constant | By::Time => {
+                        refined.further(&self.evidence, &self.variants, self.total(), STEPS)
+                    }
+                }
+            })
+            .collect()
     }
 
     /// The leads that gain, where linear algebra puts them, a fair share of what the best of them gains there.
@@ -267,7 +306,8 @@ impl<'a> Search<'a> {
         };
         self.settle(&traces, &leads, best.gain);
         let noise = noises(&self.evidence, &best.settings, self.total() + best.gain);
-        if self.remainder.1.min(by_chance(&noise)) >= 1e-3 {
+        let left = noise.iter().map(|n| n.gain).fold(0.0, f64::max) / best.gain.max(1e-9);
+        if self.remainder.1.min(by_chance(&noise)) >= SIGNIFICANT_P || self.remainder.0.max(left) < FAULTS {
             return;
         }
         let mut more: Vec<Refined> = Vec::new();
@@ -284,7 +324,8 @@ impl<'a> Search<'a> {
         }
         // Each further value must gain ten.
         more.retain(|pair| {
-            pair.gain - best.gain > 10.0 * (pair.fitted.saturating_sub(best.fitted)).max(1) as f64
+            let further = pair.fitted.saturating_sub(best.fitted).max(1) as f64;
+            pair.gain - best.gain > (10.0 * further).max(FAULTS * best.gain)
         });
         if more.is_empty() {
             return;

@@ -19,8 +19,10 @@ mod refine;
 mod rows;
 mod screen;
 mod search;
+mod separation;
 mod steps;
 
 pub use decide::Decided;
 pub use diagnosis::{Channel, LogDiagnosis, diagnose_logs};
 pub use rows::LogRow;
+pub use separation::log_separation;

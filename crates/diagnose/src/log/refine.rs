@@ -54,7 +54,10 @@ pub(crate) fn knobs(variant: &Variant, setting: usize, pattern: &Pattern) -> Vec
 
 /// Whether an effect's derivative says nothing about its size: it jumps.
 pub(crate) fn jumps(setting: &Setting) -> bool {
-    matches!(setting.spec.name, "command-delay" | "speed-step" | "dead-band")
+    matches!(
+        setting.spec.name,
+        "command-delay" | "speed-step" | "dead-band" | "sensor-reach"
+    )
 }
 
 /// Gauss and Newton's method on the whitened innovations; a step counts only if the log-likelihood rises.

@@ -6,7 +6,7 @@ use sim::{Pattern, Setting, UNLISTED};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::catalogue::{Shape, Variant};
-use super::evidence::Evidence;
+use super::evidence::{Evidence, Knob};
 use super::refine::{Fitted, hunt, jumps, knobs, refine};
 use super::screen::{Normal, solve};
 
@@ -32,7 +32,7 @@ pub(crate) struct Lead {
 impl Lead {
     /// Gain less what chance and choice give to as many values (the Bayesian price of a value told to 1 in 80).
     pub(crate) fn score(&self) -> f64 {
-        trusted(self.gain, self.by) - price(self.fitted, self.by)
+        trusted(self.gain, self.fitted, self.by) - price(self.fitted, self.by)
     }
 
     /// Probability of as large a gain by chance.
@@ -47,8 +47,12 @@ pub(crate) fn price(fitted: usize, by: By) -> f64 {
 }
 
 /// What counts of a gain: at very high signal no model is exact, and free values follow its faults.
-fn trusted(gain: f64, by: By) -> f64 {
-    if by == By::Constant { gain } else { 0.993 * gain }
+fn trusted(gain: f64, fitted: usize, by: By) -> f64 {
+    const BY_VALUE: f64 = 0.002;
+    const BY_PATTERN: f64 = 0.007;
+    let pattern = if by == By::Constant { 0.0 } else { BY_PATTERN };
+    let values = BY_VALUE * fitted.saturating_sub(1).min(3) as f64;
+    (1.0 - pattern - values) * gain
 }
 
 /// Probability that a chi-squared variable exceeds a value.
@@ -175,20 +179,40 @@ pub(crate) struct Refined {
 
 impl Refined {
     pub(crate) fn score(&self) -> f64 {
-        trusted(self.gain, self.by) - price(self.fitted, self.by)
+        trusted(self.gain, self.fitted, self.by) - price(self.fitted, self.by)
     }
 
-    /// The settings fitted again to other evidence, from where they are; those that jump or go by run stay.
-    pub(crate) fn refit(&self, evidence: &Evidence<'_>, variants: &[Variant]) -> Vec<Setting> {
-        const STEPS: usize = 2;
-        let knobs: Vec<_> = (self.settings.iter().enumerate())
+    /// Refined by further steps from where it is; `base` is the log-likelihood of the declared model.
+    pub(crate) fn further(
+        self,
+        evidence: &Evidence<'_>,
+        variants: &[Variant],
+        base: f64,
+        steps: usize,
+    ) -> Self {
+        let knobs = self.knobs(variants);
+        match refine(evidence, self.settings.clone(), knobs, steps) {
+            Some(fitted) => refined(fitted, base, self.by),
+            None => self,
+        }
+    }
+
+    /// The values that a refinement may change: not those that jump or go by run.
+    fn knobs(&self, variants: &[Variant]) -> Vec<Knob> {
+        (self.settings.iter().enumerate())
             .filter(|(_, setting)| !jumps(setting) && !matches!(setting.pattern, Pattern::ByRun(_)))
             .filter_map(|(i, setting)| {
                 let variant = variants.iter().find(|v| v.spec == setting.spec)?;
                 Some(knobs(variant, i, &setting.pattern))
             })
             .flatten()
-            .collect();
+            .collect()
+    }
+
+    /// The settings fitted again to other evidence, from where they are; those that jump or go by run stay.
+    pub(crate) fn refit(&self, evidence: &Evidence<'_>, variants: &[Variant]) -> Vec<Setting> {
+        const STEPS: usize = 2;
+        let knobs = self.knobs(variants);
         if knobs.is_empty() || evidence.stretches.is_empty() {
             return self.settings.clone();
         }
@@ -213,12 +237,12 @@ pub(crate) fn pursue(
     variant: &Variant,
     lead: &Lead,
     base: &[f64],
+    steps: usize,
 ) -> Option<Refined> {
-    const STEPS: usize = 8;
     match lead.by {
         By::Constant => {
             let setting = Setting::constant(variant.spec, variant.values_at(lead.multiples[0].as_slice()));
-            let fitted = follow(evidence, variant, setting, STEPS)?;
+            let fitted = follow(evidence, variant, setting, steps)?;
             Some(refined(fitted, base.iter().sum(), By::Constant))
         }
         By::Time => {
@@ -231,7 +255,7 @@ pub(crate) fn pursue(
             };
             let knobs = knobs(variant, 0, &setting.pattern);
             Some(refined(
-                refine(evidence, vec![setting], knobs, STEPS)?,
+                refine(evidence, vec![setting], knobs, steps)?,
                 base.iter().sum(),
                 By::Time,
             ))
@@ -241,7 +265,7 @@ pub(crate) fn pursue(
             let parts = (runs.par_iter().zip(&lead.multiples))
                 .map(|(&run, multiples)| {
                     let setting = Setting::constant(variant.spec, variant.values_at(multiples.as_slice()));
-                    follow(&evidence.of_run(run), variant, setting, STEPS)
+                    follow(&evidence.of_run(run), variant, setting, steps)
                 })
                 .collect::<Option<Vec<_>>>()?;
             Some(by_runs(evidence, variant, &runs, &parts, base))
@@ -254,6 +278,7 @@ fn follow(evidence: &Evidence<'_>, variant: &Variant, setting: Setting, steps: u
         let spread = match setting.spec.name {
             "command-delay" => 0.032,
             "speed-step" => 5e-4,
+            "sensor-reach" => 0.04,
             _ => 0.003,
         };
         return hunt(evidence, &setting, spread);

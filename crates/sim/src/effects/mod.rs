@@ -24,7 +24,7 @@ use track::Vec2;
 
 pub(crate) use setting::Active;
 pub use setting::{Pattern, Setting};
-pub use unlisted::UNLISTED;
+pub use unlisted::{UNLISTED, unlisted_at, unlisted_on_floor};
 
 use crate::{Machine, Pose, Readings, Twist, WallPlace, WheelSpeeds};
 

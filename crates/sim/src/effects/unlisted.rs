@@ -63,7 +63,7 @@ fn amount(values: &[f64], now: &Moment, targets: &[&str]) -> Option<f64> {
     }
     let (coefficients, command) = (&values[WORDS..], now.command);
     let u = match word(&DEPENDS_ON, values[1]) {
-        "place" => return Some(on_floor(coefficients, now.pose.position - now.arena_middle)),
+        "place" => return Some(unlisted_on_floor(values, now.pose.position - now.arena_middle)),
         "heading" => now.pose.heading_rad(),
         "gate" => std::f64::consts::TAU * now.gate as f64 / now.gate_count as f64,
         "speed" => 0.5 * (command.left_m_s + command.right_m_s),
@@ -71,10 +71,22 @@ fn amount(values: &[f64], now: &Moment, targets: &[&str]) -> Option<f64> {
         "time" => now.time_s,
         _ => return Some(coefficients.iter().sum()),
     };
-    Some(match word(&BASES, values[2]) {
-        "harmonics" => harmonics(coefficients, u),
-        _ => coefficients.iter().rev().fold(0.0, |sum, c| sum * u + c),
-    })
+    Some(unlisted_at(values, u))
+}
+
+/// What an effect without a name does at one value of the variable it depends on, in the units of what it acts on;
+/// `values` are those of a setting of [`UNLISTED`]. A place is no single variable: see [`unlisted_on_floor`].
+pub fn unlisted_at(values: &[f64], variable: f64) -> f64 {
+    let coefficients = &values[WORDS..];
+    match word(&BASES, values[2]) {
+        "harmonics" => harmonics(coefficients, variable),
+        _ => coefficients.iter().rev().fold(0.0, |sum, c| sum * variable + c),
+    }
+}
+
+/// What an effect without a name that depends on the place does at a place, seen from the arena's middle, m.
+pub fn unlisted_on_floor(values: &[f64], from_middle: Vec2) -> f64 {
+    on_floor(&values[WORDS..], from_middle)
 }
 
 fn harmonics(coefficients: &[f64], u: f64) -> f64 {

@@ -1,0 +1,147 @@
+//! The program under test, run as its user runs it.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+use std::time::Instant;
+
+use anyhow::{Context, Result, ensure};
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+use sha2::{Digest, Sha256};
+
+use crate::labels::Set;
+use crate::score::Trace;
+
+/// The binary, and the folder that everything goes to.
+#[derive(Debug)]
+pub(crate) struct Lapwing {
+    binary: PathBuf,
+    /// Tells builds of the program apart.
+    pub(crate) build: String,
+    pub(crate) out: PathBuf,
+}
+
+/// What an answer cost, and which build gave it.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(crate) struct Timing {
+    pub(crate) seconds: f64,
+    pub(crate) build: String,
+}
+
+impl Lapwing {
+    /// The binary beside this example, built anew where cargo runs us.
+    ///
+    /// # Errors
+    /// A build that fails, no binary, a folder that cannot be made.
+    pub(crate) fn built(out: &Path) -> Result<Self> {
+        let exe = std::env::current_exe()?;
+        let beside = (exe.parent().and_then(Path::parent)).context("this example has no folder")?;
+        if let Some(cargo) = std::env::var_os("CARGO") {
+            let target = beside.parent().context("there is no target folder")?;
+            let mut build = Command::new(cargo);
+            build.current_dir(env!("CARGO_MANIFEST_DIR"));
+            build
+                .args(["build", "--bin", "lapwing", "--target-dir"])
+                .arg(target);
+            if beside.ends_with("release") {
+                build.arg("--release");
+            }
+            ensure!(build.status()?.success(), "lapwing does not build");
+        }
+        let binary = beside.join(format!("lapwing{}", std::env::consts::EXE_SUFFIX));
+        let bytes = fs::read(&binary)
+            .with_context(|| format!("{}: not there; build lapwing first", binary.display()))?;
+        let digest = Sha256::digest(&bytes);
+        let build = digest.iter().take(6).map(|byte| format!("{byte:02x}")).collect();
+        fs::create_dir_all(out.join("traces"))
+            .with_context(|| format!("{}: cannot be made", out.display()))?;
+        let out = out.to_owned();
+        Ok(Self { binary, build, out })
+    }
+
+    /// The answer to a data set: the one that is kept, or else a new one. A set that cannot be traced has an answer that
+    /// says so, which is not kept.
+    ///
+    /// # Errors
+    /// A file that cannot be read or written.
+    pub(crate) fn trace(&self, set: &Set) -> Result<(Trace, Timing)> {
+        let name = &set.label.name;
+        let kept = self.out.join("traces").join(format!("{name}.json"));
+        let timed = kept.with_extension("timing.json");
+        if kept.exists() {
+            return Ok((
+                Trace::new(&read_json(&kept)?)?,
+                serde_json::from_value(read_json(&timed)?)?,
+            ));
+        }
+        let work = self.out.join("work").join(name);
+        let start = Instant::now();
+        let mut command = Command::new(&self.binary);
+        command.args(["trace", "roduit2007", "--json", "--quiet", "--set"]);
+        command.arg(format!("controller.kind={}", set.label.controller.name()));
+        command.arg("--measured").arg(&set.folder);
+        command.arg("--out").arg(&work);
+        command.arg("--cache").arg(self.out.join("cache"));
+        let output = self.run(&mut command)?;
+        let timing = Timing {
+            seconds: start.elapsed().as_secs_f64(),
+            build: self.build.clone(),
+        };
+        if !output.status.success() {
+            let message = String::from_utf8_lossy(&output.stderr);
+            return Ok((Trace::failed(message.trim()), timing));
+        }
+        let document: Value =
+            serde_json::from_slice(&output.stdout).with_context(|| format!("{name}: no JSON on stdout"))?;
+        let trace = Trace::new(&document).with_context(|| format!("{name}: not as trace.json should be"))?;
+        fs::write(&timed, serde_json::to_string(&timing)?)?;
+        write_whole(&kept, &format!("{document:#}\n"))?;
+        fs::remove_dir_all(&work).with_context(|| format!("{}: cannot be removed", work.display()))?;
+        Ok((trace, timing))
+    }
+
+    /// Simulates a data set with a model file.
+    ///
+    /// # Errors
+    /// A model that the program refuses.
+    pub(crate) fn drive(&self, model: &Path, laps: usize, log: bool, seed: u64, to: &Path) -> Result<Value> {
+        let mut command = Command::new(&self.binary);
+        command
+            .arg("drive")
+            .arg(model)
+            .args(["--json", "--quiet", "--runs", "4"]);
+        command.args(["--laps", &laps.to_string(), "--seed", &seed.to_string()]);
+        command.args(log.then_some("--log"));
+        let output = self.run(command.arg("--out").arg(to))?;
+        let message = String::from_utf8_lossy(&output.stderr);
+        ensure!(output.status.success(), "{}: {}", model.display(), message.trim());
+        Ok(serde_json::from_slice(&output.stdout)?)
+    }
+
+    fn run(&self, command: &mut Command) -> Result<Output> {
+        let output = command.output();
+        output.with_context(|| format!("{}: does not start", self.binary.display()))
+    }
+}
+
+/// How many answers each build gave.
+pub(crate) fn builds<'a>(timings: impl Iterator<Item = &'a Timing>) -> BTreeMap<&'a str, usize> {
+    let mut counts = BTreeMap::new();
+    timings.for_each(|timing| *counts.entry(timing.build.as_str()).or_default() += 1);
+    counts
+}
+
+fn read_json(path: &Path) -> Result<Value> {
+    let shown = path.display();
+    let text = fs::read_to_string(path).with_context(|| format!("{shown}: cannot be read"))?;
+    serde_json::from_str(&text).with_context(|| format!("{shown}: no JSON"))
+}
+
+/// A file that is there whole or not at all.
+fn write_whole(path: &Path, text: &str) -> Result<()> {
+    let partial = path.with_extension("partial");
+    fs::write(&partial, text)?;
+    Ok(fs::rename(&partial, path)?)
+}

@@ -1,0 +1,176 @@
+//! What the data cannot tell, and what would.
+
+use std::collections::BTreeMap;
+
+use diagnose::{Decided, Detectable};
+
+use super::Trace;
+use super::next::Experiment;
+use crate::experiments::Block;
+use crate::table::{Table, probability};
+
+/// The next experiment in a sentence; `None` where nothing has to be told apart.
+pub(crate) fn next_in_words(trace: &Trace) -> Option<String> {
+    let best = trace.experiments.first()?;
+    let laps = match best.laps_needed() {
+        Some(laps) => format!("about {laps} laps would do for 5 standard deviations"),
+        None => "more than ten such sets would be needed for 5 standard deviations".to_owned(),
+    };
+    Some(format!(
+        "To tell them apart: {} ({:.1} standard deviations expected of {} laps; {laps}); add them as a second --measured.",
+        best.name,
+        best.least(),
+        best.laps
+    ))
+}
+
+/// The experiments that would tell rivals apart.
+pub(super) fn next_experiment(trace: &Trace) -> Vec<Block> {
+    if trace.experiments.is_empty() {
+        return vec![Block::Text("There is nothing to tell apart.".into())];
+    }
+    let mut blocks: Vec<Block> = next_in_words(trace).into_iter().map(Block::Text).collect();
+    let mut table = Table::new(
+        "Experiments that would tell the answer from its rivals, by what a lap of them tells",
+        &["experiment", "rival", "sigma", "of laps", "laps for 5 sigma"],
+    );
+    for experiment in &trace.experiments {
+        let needed = |e: &Experiment| {
+            e.laps_needed()
+                .map_or("too many".to_owned(), |laps| laps.to_string())
+        };
+        for (rival, sigma) in &experiment.separations {
+            table.push([
+                experiment.name.clone(),
+                rival.clone(),
+                format!("{sigma:.1}"),
+                experiment.laps.to_string(),
+                needed(experiment),
+            ]);
+        }
+    }
+    blocks.push(Block::Table(table));
+    blocks
+}
+
+/// The smallest effects that would have been seen.
+pub(super) fn limits(trace: &Trace) -> Vec<Block> {
+    let mut blocks: Vec<Block> = trace.remarks.iter().cloned().map(Block::Text).collect();
+    if trace.detectable.is_empty() {
+        blocks.push(Block::Text(
+            "With the robot's log each effect is seen from about the size at which it gains five standard deviations over the \
+             declared model; the intervals above are what a size is known to."
+                .into(),
+        ));
+        return blocks;
+    }
+    let mut names: BTreeMap<&str, Vec<&Detectable>> = BTreeMap::new();
+    for detectable in &trace.detectable {
+        names.entry(detectable.spec.name).or_default().push(detectable);
+    }
+    let mut table = Table::new(
+        "Sizes from which a single effect shows in these laps in 95 of 100 cases (over its sensors, places and directions: \
+         the easiest to the hardest)",
+        &["effect", "parameter", "below", "above"],
+    );
+    let mut unseen = vec!["marker-offset (angle_rad)".to_owned()];
+    for (name, all) in names {
+        let side = |of: &dyn Fn(&Detectable) -> Option<f64>, reversed: bool| range(&all, of, reversed);
+        let (below, above) = (side(&|d| d.below, true), side(&|d| d.above, false));
+        if below.is_none() && above.is_none() {
+            unseen.push(name.to_owned());
+            continue;
+        }
+        let parameter = match all[0].unit {
+            "" => all[0].parameter.to_owned(),
+            unit => format!("{}, {unit}", all[0].parameter),
+        };
+        let shown = |side: Option<String>| side.unwrap_or_else(|| "-".to_owned());
+        table.push([name.to_owned(), parameter, shown(below), shown(above)]);
+    }
+    blocks.push(Block::Table(table));
+    blocks.push(Block::Text(format!(
+        "Not seen at any size that was looked at: {}. A shifted or turned world is the same as a shifted or turned camera, \
+         and a controller's speed the same as both wheels'.",
+        unseen.join(", ")
+    )));
+    blocks
+}
+
+/// From the easiest to the hardest to see; `None` if one of them is not seen at all and no other is.
+fn range(all: &[&Detectable], of: &dyn Fn(&Detectable) -> Option<f64>, falling: bool) -> Option<String> {
+    let mut sizes: Vec<f64> = all.iter().filter_map(|d| of(d)).collect();
+    sizes.sort_by(|a, b| if falling { b.total_cmp(a) } else { a.total_cmp(b) });
+    let (first, last) = (sizes.first()?, sizes.last()?);
+    let hidden = if sizes.len() < all.len() {
+        ", some never"
+    } else {
+        ""
+    };
+    let one = |x: f64| {
+        format!("{x:.3e}")
+            .parse::<f64>()
+            .map_or(String::new(), |x| format!("{x}"))
+    };
+    Some(if sizes.len() == 1 {
+        format!("{}{hidden}", one(*first))
+    } else {
+        format!("{} to {}{hidden}", one(*first), one(*last))
+    })
+}
+
+/// What the robot's log says stage by stage.
+pub(super) fn stages(trace: &Trace) -> Vec<Block> {
+    let Some(found) = &trace.from_logs else {
+        return vec![Block::Text(
+            "There is no log of readings and commands: the laps alone were judged.".into(),
+        )];
+    };
+    let logs = &found.logs;
+    let decide = match &logs.decide {
+        Decided::AsDeclared => {
+            "The declared controller gives every logged command from the logged readings.".to_owned()
+        }
+        Decided::Changed(effects) => format!(
+            "The logged commands follow from the logged readings with another constant: {}.",
+            effects.iter().map(|e| e.label()).collect::<Vec<_>>().join(", ")
+        ),
+        Decided::NoController { share } => format!(
+            "No controller of this kind gives {:.1} % of the logged commands from the logged readings: look at the units (readings in \
+             counts, speeds in m/s) and at the controller.",
+            100.0 * share
+        ),
+        Decided::Unknown => "No control step has both readings and commands.".to_owned(),
+    };
+    let agree = if found.confirmed {
+        "The laps agree."
+    } else {
+        "The laps do not agree with what the logs say: both are shown and neither is claimed."
+    };
+    let mut table = Table::new(
+        "Innovations of the filter with the best explanation: 1, 3 and 0 if it were the whole truth",
+        &["measured", "number", "mean square", "kurtosis", "correlation"],
+    );
+    let names = [
+        "camera x", "camera y", "S0", "S1", "S2", "S3", "S4", "S5", "S6", "S7",
+    ];
+    for (name, channel) in names.iter().zip(&logs.channels) {
+        table.push([
+            (*name).to_owned(),
+            channel.count.to_string(),
+            format!("{:.3}", channel.mean_square),
+            format!("{:.2}", channel.kurtosis),
+            format!("{:+.3}", channel.correlation),
+        ]);
+    }
+    vec![
+        Block::Text(decide),
+        Block::Text(format!(
+            "{} control steps were followed by a filter over the pose that takes the camera and all readings; the probability of as \
+             much by chance is {}. {agree}",
+            logs.steps,
+            probability(logs.p)
+        )),
+        Block::Table(table),
+    ]
+}

@@ -1,0 +1,255 @@
+//! The experiment that would tell apart what these data do not.
+
+use anyhow::Result;
+use diagnose::{Candidate, Explanation, LogRow, Rival, log_separation, separations};
+use sim::{Controller, Setting, Step, Streams};
+use track::Lap;
+
+use super::Trace;
+use super::answer::rivals;
+use super::recording::{Recording, Seeds};
+use crate::config::Config;
+use crate::interrupt;
+use crate::setup::Setup;
+
+/// Shape of the data set that an experiment is judged by.
+const RUNS: usize = 4;
+const LAPS: usize = 20;
+/// Laps of each run with the robot's log: logs say more.
+const LOGGED_LAPS: usize = 3;
+/// Standard deviations at which two explanations are told apart.
+const ENOUGH: f64 = 5.0;
+/// Rivals that are looked at.
+const RIVALS: usize = 3;
+
+/// An experiment that has not been made.
+#[derive(Debug, Clone)]
+pub(crate) struct Experiment {
+    /// What to do, in words.
+    pub(crate) name: String,
+    /// Keys of the model to set for it, as `[declared]` names them.
+    pub(crate) declared: Vec<(&'static str, String)>,
+    /// Rival by rival: name, and standard deviations between its laps and the answer's.
+    pub(crate) separations: Vec<(String, f64)>,
+    /// Laps that a data set of these standard deviations has.
+    pub(crate) laps: usize,
+}
+
+impl Experiment {
+    /// Standard deviations between the answer and the rival that is nearest to it.
+    pub(crate) fn least(&self) -> f64 {
+        self.separations
+            .iter()
+            .map(|(_, s)| *s)
+            .fold(f64::INFINITY, f64::min)
+    }
+
+    /// Laps that tell the answer from every rival; `None` if that would take more than ten times as many.
+    pub(crate) fn laps_needed(&self) -> Option<usize> {
+        let needed = (self.laps as f64 * (ENOUGH / self.least()).powi(2)).ceil();
+        (needed <= 10.0 * self.laps as f64).then_some((needed as usize).max(RUNS))
+    }
+}
+
+/// What to set for a lap experiment: words, and keys of the model with their values.
+fn ideas(config: &Config, setup: &Setup) -> Vec<(String, Vec<(&'static str, String)>)> {
+    let mut ideas = vec![("more laps as they are".to_owned(), Vec::new())];
+    let backward = match config.run.direction {
+        crate::config::Direction::Clockwise => "counter-clockwise",
+        crate::config::Direction::CounterClockwise => "clockwise",
+    };
+    ideas.push((
+        format!("{backward} laps"),
+        vec![("run.direction", backward.to_owned())],
+    ));
+    let (gain_key, gain) = match setup.model.machine.controller {
+        Controller::Braitenberg { gain_per_count, .. } => ("controller.gain_per_count", 2.0 * gain_per_count),
+        Controller::RuleBased { threshold_counts, .. } => {
+            ("controller.threshold_counts", 0.6 * threshold_counts)
+        }
+    };
+    ideas.push((
+        format!("laps with {gain_key} = {gain}"),
+        vec![(gain_key, gain.to_string())],
+    ));
+    let speed = 0.6 * setup.model.machine.controller.speed_m_s();
+    ideas.push((
+        format!("laps with controller.speed_m_s = {speed}"),
+        vec![("controller.speed_m_s", speed.to_string())],
+    ));
+    ideas
+}
+
+/// Experiments that would tell the answer from its rivals, the best first; none where nothing has to be told apart.
+///
+/// # Errors
+/// Interrupted.
+pub(crate) fn experiments(trace: &Trace, seed: u64) -> Result<Vec<Experiment>> {
+    let Some(answer) = trace.answer.claimed() else {
+        return Ok(Vec::new());
+    };
+    let mut others: Vec<&Explanation> = Vec::new();
+    for rival in rivals(&trace.answer).iter().skip(1) {
+        let known = others
+            .iter()
+            .chain([&answer])
+            .any(|other| other.names() == rival.names());
+        if !known && others.len() < RIVALS {
+            others.push(rival);
+        }
+    }
+    if others.is_empty() {
+        return Ok(Vec::new());
+    }
+    let recording = &trace.recordings[0];
+    let mut found = Vec::new();
+    for (name, declared) in ideas(&recording.config, &recording.setup) {
+        interrupt::check()?;
+        let Some(setup) = changed(recording, &declared) else {
+            continue;
+        };
+        if trace.from_logs.is_none() {
+            let separations = by_laps(&setup, answer, &others, seed);
+            found.extend(separations.map(|separations| Experiment {
+                name: name.clone(),
+                declared: declared.clone(),
+                separations,
+                laps: RUNS * LAPS,
+            }));
+        }
+        // The robot's log is worth having with the laps as they are, and where there is one it says more than laps.
+        if declared.is_empty() || trace.from_logs.is_some() {
+            let separations = by_logs(&setup, answer, &others, seed);
+            found.extend(separations.map(|separations| Experiment {
+                name: format!("{name}, with the robot's log of readings and commands"),
+                declared,
+                separations,
+                laps: RUNS * LOGGED_LAPS,
+            }));
+        }
+    }
+    found.retain(|experiment| experiment.least() > 0.5);
+    found.sort_by(|a, b| {
+        (b.least() / (b.laps as f64).sqrt()).total_cmp(&(a.least() / (a.laps as f64).sqrt()))
+    });
+    Ok(found)
+}
+
+/// The declared model with some keys set otherwise; `None` if it cannot drive so.
+fn changed(recording: &Recording, declared: &[(&'static str, String)]) -> Option<Setup> {
+    let mut config = recording.config.clone();
+    for (key, value) in declared {
+        config = config.with(key, value).ok()?;
+    }
+    Setup::new(&config, recording.measured.circuit.clone(), None).ok()
+}
+
+fn by_laps(
+    setup: &Setup,
+    answer: &Explanation,
+    others: &[&Explanation],
+    seed: u64,
+) -> Option<Vec<(String, f64)>> {
+    let simulate = |effects: &[Setting], set: u64| -> Option<Vec<Vec<Lap>>> {
+        Recording::drive(setup, effects, Seeds { session: seed, set }, &[LAPS; RUNS], 0)
+    };
+    let rivals: Vec<Rival> = (others.iter())
+        .map(|other| Rival {
+            settings: first_runs(&other.settings()),
+            relative_error: relative_error(&other.effects[0]),
+        })
+        .collect();
+    let found = separations(&simulate, &first_runs(&answer.settings()), &rivals)?;
+    Some(named(others, found))
+}
+
+fn by_logs(
+    setup: &Setup,
+    answer: &Explanation,
+    others: &[&Explanation],
+    seed: u64,
+) -> Option<Vec<(String, f64)>> {
+    let rows = logs(setup, &first_runs(&answer.settings()), seed)?;
+    let runs: Vec<&[LogRow]> = rows.iter().map(Vec::as_slice).collect();
+    let found = others
+        .iter()
+        .map(|other| {
+            log_separation(
+                &setup.model,
+                &setup.scene,
+                &runs,
+                &answer.settings(),
+                &other.settings(),
+            )
+        })
+        .collect();
+    Some(named(others, found))
+}
+
+fn named(others: &[&Explanation], found: Vec<Option<f64>>) -> Vec<(String, f64)> {
+    // A rival with which the robot crashes is told apart by the first lap.
+    const CERTAIN: f64 = 1e3;
+    let name = |other: &&Explanation| other.names().join(" + ");
+    others
+        .iter()
+        .map(name)
+        .zip(found.into_iter().map(|s| s.unwrap_or(CERTAIN)))
+        .collect()
+}
+
+/// Simulated logs of a robot with effects.
+fn logs(setup: &Setup, effects: &[Setting], seed: u64) -> Option<Vec<Vec<LogRow>>> {
+    let mut model = setup.model.clone();
+    model.effects.extend_from_slice(effects);
+    let run = |run: usize| {
+        let world = setup.scene.world(&model, run).ok()?;
+        let streams = Streams {
+            seed: (seed << 20) + (1 << 51),
+            run: run as u64,
+        };
+        let mut rows = Vec::new();
+        let record = |step: &Step| {
+            rows.push(LogRow {
+                time_s: step.time_s,
+                observed: Some(step.observed),
+                readings: step.readings,
+                command: step.command,
+            });
+        };
+        let drive = sim::drive(&world, streams, LOGGED_LAPS, record).ok()?;
+        (drive.laps.len() == LOGGED_LAPS).then_some(rows)
+    };
+    (0..RUNS).map(run).collect()
+}
+
+/// Effects for the four runs of an experiment: sizes by run go round.
+fn first_runs(settings: &[Setting]) -> Vec<Setting> {
+    let fitted = |setting: &Setting| match &setting.pattern {
+        sim::Pattern::ByRun(values) => Setting {
+            spec: setting.spec,
+            pattern: sim::Pattern::ByRun((0..RUNS).map(|run| values[run % values.len()].clone()).collect()),
+        },
+        _ => setting.clone(),
+    };
+    settings.iter().map(fitted).collect()
+}
+
+/// The relative error of an effect's size: the least of its fitted values'.
+fn relative_error(effect: &Candidate) -> f64 {
+    let values = match &effect.setting.pattern {
+        sim::Pattern::Constant(values) => values.clone(),
+        sim::Pattern::ByTime { start, .. } => start.clone(),
+        sim::Pattern::ByRun(runs) => runs.concat(),
+    };
+    let params = effect.setting.spec.params;
+    values
+        .iter()
+        .zip(&effect.standard_errors)
+        .enumerate()
+        .filter(|(_, (_, error))| **error > 0.0)
+        .filter_map(|(i, (value, error))| {
+            let neutral = params.get(i % params.len())?.neutral?;
+            Some(error / (value - neutral).abs().max(1e-12))
+        })
+        .fold(1.0, f64::min)
+}

@@ -1,0 +1,110 @@
+//! A cause without a name, drawn.
+
+use std::f64::consts::TAU;
+
+use chart::{Axis, Color, ColorMap, ColorScale, Dash, Figure, Mark, Panel, Shape, Style};
+use diagnose::Cause;
+use sim::{Pattern, Vec2, unlisted_at, unlisted_on_floor};
+
+use super::Trace;
+use crate::experiments::{Block, Picture};
+use crate::figures::{crossings, line, map, single, walls};
+
+/// What a claimed cause without a name does over what it depends on: a map of the floor, or a curve.
+pub(super) fn unnamed(trace: &Trace) -> Option<Block> {
+    let effect = trace
+        .answer
+        .claimed()?
+        .effects
+        .iter()
+        .find(|effect| Cause::of(&effect.setting).is_some())?;
+    let cause = Cause::of(&effect.setting)?;
+    let Pattern::Constant(values) = &effect.setting.pattern else {
+        return None;
+    };
+    let unit = match cause.acts_on.as_str() {
+        "yaw rate" => "rad/s",
+        "side slip" => "m/s",
+        "left-right difference" => "counts",
+        "camera x" | "camera y" => "m",
+        _ => "share",
+    };
+    let label = format!("{}, {unit}", cause.acts_on);
+    let figure = if cause.depends_on == "place" {
+        on_floor(trace, values, label)
+    } else {
+        curve(trace, values, &cause.depends_on, label)
+    };
+    let caption = format!(
+        "What the robot does and the model does not: change of the {} over the {}.",
+        cause.acts_on, cause.depends_on
+    );
+    Some(Picture::block("unlisted", "Fig. D", caption, figure))
+}
+
+fn on_floor(trace: &Trace, coefficients: &[f64], label: String) -> Figure {
+    let circuit = trace.recordings[0].setup.scene.circuit();
+    let [width_m, height_m] = circuit.course.arena_m;
+    let middle = Vec2::new(0.5 * width_m, 0.5 * height_m);
+    let mut points = crossings(circuit, &trace.errors[0].before.mean_m);
+    points.push(points[0]);
+    let values: Vec<f64> = (points.iter())
+        .map(|[x, y]| unlisted_on_floor(coefficients, Vec2::new(*x, *y) - middle))
+        .collect();
+    let most = values.iter().fold(1e-9_f64, |most, v| most.max(v.abs()));
+    let style = Style {
+        width_px: 5.0,
+        ..Style::color(Color::INK)
+    };
+    let marks = vec![
+        walls(&circuit.course),
+        Mark::new("", style, Shape::ColoredLine { points, values }),
+    ];
+    let mut panel = map("", marks);
+    panel.colors = Some(ColorScale {
+        label,
+        map: ColorMap::Diverging,
+        range: Some([-most, most]),
+    });
+    single("A cause without a name", "Its size along the mean lap.", panel)
+}
+
+fn curve(trace: &Trace, coefficients: &[f64], variable: &str, label: String) -> Figure {
+    let machine = &trace.recordings[0].setup.model.machine;
+    let run_s = trace.errors[0].before.lap_s * 20.0;
+    let (axis, low, high) = match variable {
+        "heading" => ("heading, rad", -TAU / 2.0, TAU / 2.0),
+        "gate" => ("place along the lap, rad", 0.0, TAU),
+        "time" => ("time since the run began, s", 0.0, run_s),
+        "speed" => (
+            "mean of the commanded speeds, m/s",
+            0.0,
+            machine.robot.wheel_speed_limit_m_s,
+        ),
+        _ => (
+            "difference of the commanded speeds, m/s",
+            -machine.robot.wheel_speed_limit_m_s,
+            machine.robot.wheel_speed_limit_m_s,
+        ),
+    };
+    let points = (0..=200)
+        .map(|i| low + (high - low) * f64::from(i) / 200.0)
+        .map(|u| [u, unlisted_at(coefficients, u)])
+        .collect();
+    let marks = vec![Mark::new(
+        "",
+        line(Color::BLUE, Dash::Solid, 2.0),
+        Shape::Line(points),
+    )];
+    let panel = Panel {
+        x: Axis::linear(axis),
+        y: Axis::linear(label),
+        marks,
+        ..Panel::default()
+    };
+    single(
+        "A cause without a name",
+        "Its size over what it depends on.",
+        panel,
+    )
+}

@@ -1,0 +1,42 @@
+//! How far a robot's log would tell two explanations apart.
+
+use std::sync::Arc;
+
+use sim::{Model, Pattern, Scene, Setting};
+use track::Side;
+
+use super::catalogue::variants;
+use super::evidence::Evidence;
+use super::refine::{jumps, knobs, refine};
+use super::rows::LogRow;
+
+/// The distance in standard deviations, for these logs of a robot with the answer's effects, between the answer and a rival that
+/// is fitted to them. `None` for logs that cannot be followed.
+pub fn log_separation(
+    model: &Model,
+    scene: &Scene,
+    runs: &[&[LogRow]],
+    answer: &[Setting],
+    rival: &[Setting],
+) -> Option<f64> {
+    const STEPS: usize = 4;
+    let mut wide = model.clone();
+    wide.machine.range_m *= 1.2;
+    let scene = Scene::new(Arc::new(scene.circuit().clone()), &wide, None).ok()?;
+    let mut true_model = model.clone();
+    true_model.effects.extend_from_slice(answer);
+    let masks = Evidence::new(&scene, &true_model, runs, 0.0).ok()?;
+    let evidence = Evidence { model, ..masks };
+    let course = &scene.circuit().course;
+    let variants = variants([Side::Outer, Side::Inner].map(|side| course.wall(side).length_m()));
+    let knobs = (rival.iter().enumerate())
+        .filter(|(_, setting)| !jumps(setting) && !matches!(setting.pattern, Pattern::ByRun(_)))
+        .filter_map(|(i, setting)| {
+            let variant = variants.iter().find(|variant| variant.spec == setting.spec)?;
+            Some(knobs(variant, i, &setting.pattern))
+        })
+        .flatten()
+        .collect();
+    let best = refine(&evidence, rival.to_vec(), knobs, STEPS)?.log_likelihood;
+    Some((2.0 * (evidence.likelihood(answer)? - best).max(0.0)).sqrt())
+}
