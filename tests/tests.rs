@@ -3,10 +3,17 @@
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 mod cli;
+mod controls;
 mod declared;
 mod determinism;
 mod errors;
+#[path = "../benches/ground/mod.rs"]
+mod ground;
 mod iris;
+mod practice;
 mod support;
 mod sweep;
+mod trace_input;
+mod tracing;
+mod undeclared;
 mod world;
