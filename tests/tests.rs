@@ -2,6 +2,7 @@
 // In tests, as clippy.toml says; helpers stand outside test functions here.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
+mod case_study;
 mod cli;
 mod controls;
 mod declared;

@@ -122,7 +122,9 @@ impl Deck {
     fn next(&mut self, controller: Controller, others: &[Recipe]) -> Recipe {
         // The rule-based controller never commands so slowly.
         let acts = |recipe: &Recipe| controller == Controller::Braitenberg || recipe.name != "dead-band";
-        let other = |recipe: &Recipe| others.iter().all(|other| other.name != recipe.name);
+        // As in the practice sets, two effects are in two stages.
+        let stage = |recipe: &Recipe| sim::find(recipe.name).map(|spec| spec.stage).ok();
+        let other = |recipe: &Recipe| others.iter().all(|other| stage(other) != stage(recipe));
         loop {
             if let Some(at) = self
                 .cards

@@ -43,6 +43,9 @@ struct Args {
     /// Seed of the fresh data sets
     #[arg(long, default_value_t = 1)]
     seed: u64,
+    /// Make the fresh data sets and trace nothing
+    #[arg(long)]
+    sets_only: bool,
     /// Folder for everything: fresh sets, signatures, answers, figures
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
@@ -57,13 +60,16 @@ fn main() -> Result<()> {
     let lapwing = Lapwing::built(&args.out)?;
     let wanted = |name: &str| args.only.is_empty() || args.only.iter().any(|only| only == name);
     let mut batteries = Vec::new();
-    if let Some(folder) = &args.practice {
+    if let Some(folder) = args.practice.as_ref().filter(|_| !args.sets_only) {
         let mut sets = labels::read(folder)?;
         sets.retain(|set| wanted(&set.label.name));
         batteries.push(judged(&lapwing, "practice", sets)?);
     }
     if args.fresh > 0 {
         let sets = fresh::sets(&lapwing, args.seed, args.fresh, &wanted)?;
+        if args.sets_only {
+            return Ok(());
+        }
         batteries.push(judged(&lapwing, "fresh", sets)?);
     }
     let text = report::markdown(&batteries, &lapwing.build);

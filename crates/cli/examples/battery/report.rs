@@ -190,7 +190,7 @@ pub(crate) fn write_csv(path: &Path, batteries: &[Battery]) -> Result<()> {
 fn row(battery: &str, outcome: &Outcome) -> [String; 26] {
     let Outcome { label, trace, timing } = outcome;
     let first = trace.effects.first();
-    let number = |value: Option<f64>| value.map_or_else(String::new, |value| value.to_string());
+    let number = |value: Option<f64>| value.map_or_else(String::new, |value| format!("{value:.6}"));
     let first_of = |names: fn(&crate::score::Baselines) -> &Vec<String>| {
         let baselines = trace.baselines.as_ref();
         baselines.map_or_else(String::new, |baselines| names(baselines).join("|"))
@@ -220,7 +220,7 @@ fn row(battery: &str, outcome: &Outcome) -> [String; 26] {
         first.and_then(|first| first.by.clone()).unwrap_or_default(),
         outcome.reported().into_iter().collect::<Vec<_>>().join("|"),
         number(first.and_then(|first| first.share)),
-        number(trace.residual.p),
+        (trace.residual.p).map_or_else(String::new, |p| format!("{p:.3e}")),
         outcome.right().to_string(),
         outcome.below_detection().to_string(),
         outcome.exact().to_string(),

@@ -20,6 +20,9 @@ pub(crate) struct Row {
     pub(crate) here: Vec<Estimate>,
 }
 
+/// The distance between a measured run and a simulation, each by its place; `None` where no lap was simulated.
+pub(crate) type DistanceOf<'a> = dyn Fn(usize, usize) -> Option<Estimate> + 'a;
+
 /// Distances of simulations to measured runs.
 #[derive(Debug, Clone)]
 pub(crate) struct Distances {
@@ -35,7 +38,7 @@ impl Distances {
         self.beside(&self.title, "here", &[])
     }
 
-    /// The paper's line, ours under a name, and those of others with the same simulations under theirs.
+    /// The paper's line, ours under a name, and those that others have of the same simulation under theirs.
     pub(crate) fn beside(&self, title: &str, name: &str, others: &[(&str, &Self)]) -> Table {
         let heads: Vec<String> = self.runs.iter().map(|run| format!("run {run}")).collect();
         let columns: Vec<&str> = ["distance to"]
@@ -43,7 +46,7 @@ impl Distances {
             .chain(heads.iter().map(String::as_str))
             .collect();
         let mut table = Table::new(title, &columns);
-        for (place, row) in self.rows.iter().enumerate() {
+        for row in &self.rows {
             let mut line = |name: &str, cells: Vec<String>| {
                 let head = format!("{}, {name}", row.name);
                 table.push([head].into_iter().chain(cells));
@@ -53,8 +56,10 @@ impl Distances {
                 line("paper", self.runs.iter().map(cell).collect());
             }
             for (name, distances) in [(name, self)].iter().chain(others) {
-                let here = &distances.rows[place].here;
-                line(name, here.iter().map(|e| e.text(1)).collect());
+                let same = distances.rows.iter().find(|other| other.key == row.key);
+                let cells =
+                    (0..self.runs.len()).map(|run| same.map_or("-".into(), |row| row.here[run].text(1)));
+                line(name, cells.collect());
             }
         }
         table

@@ -301,12 +301,13 @@ impl Study {
         })
     }
 
-    /// For each draw one run of each variant with effects added to the model, which act as in measured run `run`.
+    /// For each draw one run of each variant with effects added to the model, which act as in measured run `run`; `None`
+    /// where no lap is closed.
     ///
     /// The random streams are those of the study's own runs, so that draws differ by the effects alone.
     ///
     /// # Errors
-    /// What the simulator refuses, a run without a lap, an interrupt.
+    /// What the simulator refuses, an interrupt.
     pub(crate) fn with_effects(
         &self,
         seed: u64,
@@ -314,14 +315,14 @@ impl Study {
         run: usize,
         variants: &[Variant],
         progress: &Progress,
-    ) -> Result<Vec<Vec<Cluster>>> {
+    ) -> Result<Vec<Vec<Option<Cluster>>>> {
         let setup = |variant: &Variant| -> Result<Setup> {
             let mut setup = variant.setup(&self.standard, &self.measured.circuit)?;
             setup.model.effects.extend_from_slice(effects);
             Ok(setup)
         };
         let setups = variants.iter().map(setup).collect::<Result<Vec<_>>>()?;
-        let cluster = |draw: usize, place: usize| -> Result<Cluster> {
+        let cluster = |draw: usize, place: usize| -> Result<Option<Cluster>> {
             interrupt::check()?;
             let Setup { model, scene } = &setups[place];
             let name = variants[place].name();
@@ -331,7 +332,10 @@ impl Study {
             };
             let drive = sim::drive(&scene.world(model, run)?, streams, self.laps, |_| {})?;
             progress.tick(1);
-            lap_cluster(name, &laps::simulated(name, 0, &drive, self.laps))
+            let run = laps::simulated(name, 0, &drive, self.laps);
+            (!run.laps.is_empty())
+                .then(|| lap_cluster(name, &run))
+                .transpose()
         };
         (0..self.draws.len())
             .into_par_iter()

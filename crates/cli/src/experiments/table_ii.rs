@@ -5,7 +5,7 @@ use chart::{Axis, Color, Dash, Figure, Fill, Mark, Marker, Panel, Shape, Side, S
 use sim::Response;
 
 use super::comparison::{Comparison, Space};
-use super::distances::{Distances, Row};
+use super::distances::{DistanceOf, Distances, Row};
 use super::outcome::{Block, Claim, Outcome, Picture, Section};
 use super::published::{self, IMPROVED, ORIGINAL, SENSOR_PAIRS};
 use super::study::{Study, Variant};
@@ -20,7 +20,7 @@ pub(crate) fn outcome(study: &Study) -> Result<Outcome> {
     let runs = study.real.len();
     let all: Vec<usize> = (0..runs).collect();
     let comparison = Comparison::new(&study.clusters(&all, &VARIANTS))?;
-    let distances = table_ii(study, std::slice::from_ref(&comparison));
+    let distances = table_ii(study, &|run, place| Some(comparison.distance(run, runs + place)));
     let responses = responses(study)?;
     let mut claims = claims(study, &comparison, &distances);
     claims.push(response_claim(&responses));
@@ -70,16 +70,17 @@ pub(crate) fn outcome(study: &Study) -> Result<Outcome> {
     })
 }
 
-/// Table II beside the paper's, from one comparison for all runs or one for each.
-pub(super) fn table_ii(study: &Study, comparisons: &[Comparison]) -> Distances {
-    let runs = study.real.len();
-    let row = |(place, (key, paper)): (usize, (&str, published::Row))| Row {
-        key: String::from(key),
-        name: NAMES[place].into(),
-        paper: Some(paper),
-        here: (0..runs)
-            .map(|run| comparisons[run % comparisons.len()].distance(run, runs + place))
-            .collect(), // eq. 8
+/// Table II beside the paper's; simulations without a distance to every run (eq. 8) are left out.
+pub(super) fn table_ii(study: &Study, distance: &DistanceOf<'_>) -> Distances {
+    let row = |(place, (key, paper)): (usize, (&str, published::Row))| {
+        Some(Row {
+            key: String::from(key),
+            name: NAMES[place].into(),
+            paper: Some(paper),
+            here: (0..study.real.len())
+                .map(|run| distance(run, place))
+                .collect::<Option<_>>()?,
+        })
     };
     Distances {
         title: "Table II: distances of the simulations to the measured runs".into(),
@@ -87,7 +88,7 @@ pub(super) fn table_ii(study: &Study, comparisons: &[Comparison]) -> Distances {
         rows: [("improved", IMPROVED), ("original", ORIGINAL)]
             .into_iter()
             .enumerate()
-            .map(row)
+            .filter_map(row)
             .collect(),
     }
 }

@@ -5,7 +5,7 @@ use chart::{Color, Dash, Figure, Panel, Side, Style};
 use serde_json::{Map, Value, json};
 
 use super::comparison::{Comparison, Space};
-use super::distances::{Distances, Row};
+use super::distances::{DistanceOf, Distances, Row};
 use super::estimate::{Estimate, Tally};
 use super::mean_lap::Difference;
 use super::outcome::{Block, Claim, Outcome, Picture, Section};
@@ -28,7 +28,7 @@ pub(crate) fn outcome(study: &Study) -> Result<Outcome> {
     let runs = study.real.len();
     let all: Vec<usize> = (0..runs).collect();
     let comparison = Comparison::new(&study.clusters(&all, &VARIANTS))?;
-    let distances = table_iii(study, std::slice::from_ref(&comparison));
+    let distances = table_iii(study, &|run, place| Some(comparison.distance(run, runs + place)));
     let shapes = Shapes::new(study, &comparison);
     let claims = [claims(study, &comparison), shapes.claims(study)].concat();
     let blocks = vec![
@@ -69,21 +69,22 @@ pub(crate) fn outcome(study: &Study) -> Result<Outcome> {
     })
 }
 
-/// Table III beside the paper's, from one comparison for all runs or one for each.
-pub(super) fn table_iii(study: &Study, comparisons: &[Comparison]) -> Distances {
-    let runs = study.real.len();
-    let row = |(place, (error_m, paper, _)): (usize, (f64, published::Row, usize))| Row {
-        key: error_m.to_string(),
-        name: NAMES[place].into(),
-        paper: Some(paper),
-        here: (0..runs)
-            .map(|run| comparisons[run % comparisons.len()].distance(run, runs + place))
-            .collect(), // eq. 8
+/// Table III beside the paper's; simulations without a distance to every run (eq. 8) are left out.
+pub(super) fn table_iii(study: &Study, distance: &DistanceOf<'_>) -> Distances {
+    let row = |(place, (error_m, paper, _)): (usize, (f64, published::Row, usize))| {
+        Some(Row {
+            key: error_m.to_string(),
+            name: NAMES[place].into(),
+            paper: Some(paper),
+            here: (0..study.real.len())
+                .map(|run| distance(run, place))
+                .collect::<Option<_>>()?,
+        })
     };
     Distances {
         title: "Table III: distances of the simulations to the measured runs".into(),
         runs: study.runs(),
-        rows: WALLS.into_iter().enumerate().map(row).collect(),
+        rows: WALLS.into_iter().enumerate().filter_map(row).collect(),
     }
 }
 

@@ -2,11 +2,12 @@
 
 use anyhow::Result;
 use pdm::Cluster;
+use rayon::prelude::*;
 use serde_json::{Value, json};
 use sim::{Pattern, Setting};
 
 use super::comparison::Comparison;
-use super::distances::{Distances, Row};
+use super::distances::{DistanceOf, Distances, Row};
 use super::estimate::{Estimate, Tally};
 use super::study::{Study, Variant};
 use super::{table_ii, table_iii};
@@ -27,7 +28,7 @@ const VARIANTS: [Variant; 5] = [
 pub(crate) struct BeforeAfter {
     before: Distances,
     pub(crate) after: Distances,
-    /// One for each row.
+    /// One for each row of `before`.
     changes: Vec<Change>,
 }
 
@@ -35,10 +36,16 @@ pub(crate) struct BeforeAfter {
 #[derive(Debug)]
 struct Change {
     before: Estimate,
-    after: Estimate,
-    /// In how many draws it got closer.
+    /// Over the draws in which the robot closes a lap; `None` without any.
+    after: Option<Estimate>,
+    /// In how many of these it got closer.
     closer: Tally,
+    /// Draws in which the robot closes no lap.
+    stuck: usize,
 }
+
+/// Distances (eq. 8) by draw, simulation and measured run; `None` for a simulation without a lap.
+type ByDraw = Vec<Vec<Option<Vec<f64>>>>;
 
 /// Number of runs that [`tables`] simulates in each draw.
 pub(crate) fn runs_per_draw(study: &Study, effects: &[Setting]) -> usize {
@@ -48,7 +55,7 @@ pub(crate) fn runs_per_draw(study: &Study, effects: &[Setting]) -> usize {
 /// Tables II and III with the effects. Where these go by run, each measured run has simulations of its own.
 ///
 /// # Errors
-/// What the simulator refuses, a simulated run without a lap, an interrupt.
+/// What the simulator refuses, an interrupt.
 pub(crate) fn tables(
     study: &Study,
     seed: u64,
@@ -77,49 +84,90 @@ fn acting_runs(study: &Study, effects: &[Setting]) -> usize {
 /// One table; `simulated` holds the clusters of [`VARIANTS`] by acting run and draw.
 fn before_and_after(
     study: &Study,
-    simulated: &[Vec<Vec<Cluster>>],
+    simulated: &[Vec<Vec<Option<Cluster>>>],
     variants: &[Variant],
-    table: fn(&Study, &[Comparison]) -> Distances,
+    table: fn(&Study, &DistanceOf<'_>) -> Distances,
 ) -> Result<BeforeAfter> {
-    let all: Vec<usize> = (0..study.real.len()).collect();
-    let before = [Comparison::new(&study.clusters(&all, variants))?];
-    let places = variants
-        .iter()
-        .filter_map(|variant| VARIANTS.iter().position(|v| v == variant));
-    let places: Vec<usize> = places.collect();
-    let compare = |draws: &Vec<Vec<Cluster>>| {
-        let mut clusters: Vec<Vec<&Cluster>> = Vec::with_capacity(draws.len());
-        for draw in draws {
-            let chosen = places.iter().map(|&place| &draw[place]);
-            clusters.push(study.real.iter().chain(chosen).collect());
-        }
-        Comparison::new(&clusters)
+    let before = by_draw(study, 1, |_, draw| {
+        let clusters = variants.iter().map(|&v| Some(&study.draws[draw].run(v).cluster));
+        clusters.collect()
+    })?;
+    let after = by_draw(study, simulated.len(), |run, draw| {
+        let clusters = VARIANTS.iter().zip(&simulated[run][draw]);
+        let of = |variant: &Variant| clusters.clone().find(|(v, _)| *v == variant)?.1.as_ref();
+        variants.iter().map(of).collect()
+    })?;
+    let distances = |draws: &ByDraw| {
+        let distance = |run: usize, place: usize| {
+            let values = draws.iter().filter_map(|draw| Some(draw[place].as_ref()?[run]));
+            let values: Vec<f64> = values.collect();
+            (!values.is_empty()).then(|| Estimate::of(&values))
+        };
+        table(study, &distance)
     };
-    let after = simulated.iter().map(compare).collect::<Result<Vec<_>>>()?;
     Ok(BeforeAfter {
         changes: (0..variants.len())
-            .map(|row| Change::new(&before, &after, study.real.len(), row))
+            .map(|place| Change::new(&before, &after, place))
             .collect(),
-        before: table(study, &before),
-        after: table(study, &after),
+        before: distances(&before),
+        after: distances(&after),
     })
 }
 
-impl Change {
-    fn new(before: &[Comparison], after: &[Comparison], runs: usize, row: usize) -> Self {
-        let draws = 0..before[0].draws.len();
-        let mean = |comparisons: &[Comparison], draw: usize| {
-            let distance =
-                |run: usize| comparisons[run % comparisons.len()].draws[draw].distance(run, runs + row);
-            (0..runs).map(distance).sum::<f64>() / runs as f64
+/// The distances of each draw's simulations in one PDM with all measured runs, anew for each of `acting` runs.
+fn by_draw<'a>(
+    study: &'a Study,
+    acting: usize,
+    clusters: impl Fn(usize, usize) -> Vec<Option<&'a Cluster>> + Sync,
+) -> Result<ByDraw> {
+    let runs = study.real.len();
+    let draw = |draw: usize| {
+        let compared = (0..acting)
+            .map(|run| distances(study, &clusters(run, draw)))
+            .collect::<Result<Vec<_>>>()?;
+        let of = |place: usize| {
+            (0..runs)
+                .map(|run| Some(compared[run % acting][place].as_ref()?[run]))
+                .collect()
         };
-        let means =
-            |comparisons: &[Comparison]| draws.clone().map(|d| mean(comparisons, d)).collect::<Vec<_>>();
-        let (before, after) = (means(before), means(after));
+        Ok((0..compared[0].len()).map(of).collect())
+    };
+    (0..study.draws.len()).into_par_iter().map(draw).collect()
+}
+
+/// The distances of simulations to all measured runs in one PDM.
+fn distances(study: &Study, simulated: &[Option<&Cluster>]) -> Result<Vec<Option<Vec<f64>>>> {
+    let runs = study.real.len();
+    let present = simulated.iter().copied().flatten();
+    let comparison = Comparison::new(&[study.real.iter().chain(present).collect()])?;
+    let mut places = runs..;
+    let mut of = |_: &Cluster| {
+        let place = places.next()?;
+        Some(
+            (0..runs)
+                .map(|run| comparison.draws[0].distance(run, place))
+                .collect(),
+        )
+    };
+    Ok(simulated.iter().map(|cluster| of((*cluster)?)).collect())
+}
+
+impl Change {
+    fn new(before: &ByDraw, after: &ByDraw, place: usize) -> Self {
+        let mean = |draw: &Vec<Option<Vec<f64>>>| {
+            let distances = draw[place].as_ref()?;
+            Some(distances.iter().sum::<f64>() / distances.len() as f64)
+        };
+        let pairs = before.iter().zip(after);
+        let pairs: Vec<(f64, f64)> = pairs
+            .filter_map(|(before, after)| Some((mean(before)?, mean(after)?)))
+            .collect();
+        let after_all: Vec<f64> = pairs.iter().map(|(_, after)| *after).collect();
         Self {
-            closer: Tally::of(before.iter().zip(&after).map(|(before, after)| after < before)),
-            before: Estimate::of(&before),
-            after: Estimate::of(&after),
+            before: Estimate::of(&before.iter().filter_map(mean).collect::<Vec<_>>()),
+            after: (!after_all.is_empty()).then(|| Estimate::of(&after_all)),
+            closer: Tally::of(pairs.iter().map(|(before, after)| after < before)),
+            stuck: before.len() - pairs.len(),
         }
     }
 
@@ -130,11 +178,36 @@ impl Change {
             times: draws - times,
             draws,
         };
-        match (self.closer.holds(), farther.holds()) {
-            (true, _) => "closer",
-            (_, true) => "farther",
+        match (draws, self.closer.holds(), farther.holds()) {
+            (0, ..) => "closes no lap",
+            (_, true, _) => "closer",
+            (_, _, true) => "farther",
             _ => "neither closer nor farther",
         }
+    }
+
+    fn sentence(&self, name: &str) -> String {
+        let all = self.stuck + self.closer.draws;
+        let Some(after) = self.after else {
+            return format!("{name} closes no lap in {all} draws");
+        };
+        let (before, after, closer) = (self.before.mean, after.mean, &self.closer);
+        let stuck = match self.stuck {
+            0 => String::new(),
+            stuck => format!("; {stuck} of {all} draws close no lap and are left out"),
+        };
+        format!(
+            "{name} {} ({before:.1} to {after:.1}, closer in {closer}{stuck})",
+            self.word()
+        )
+    }
+
+    fn json(&self, key: &str) -> Value {
+        json!({
+            "simulation": key, "change": self.word(),
+            "before": self.before.json("distance"), "after": self.after.map(|after| after.json("distance")),
+            "closer_in_draws": self.closer.times, "draws": self.closer.draws, "draws_without_a_lap": self.stuck,
+        })
     }
 }
 
@@ -145,30 +218,27 @@ impl BeforeAfter {
         self.before.beside(&title, "before", &[("after", &self.after)])
     }
 
+    fn changes(&self) -> impl Iterator<Item = (&Row, &Change)> {
+        self.before.rows.iter().zip(&self.changes)
+    }
+
     /// Whether each simulation got closer, in a sentence.
     pub(crate) fn sentence(&self) -> String {
-        let change = |(row, change): (&Row, &Change)| {
-            let (before, after) = (change.before.mean, change.after.mean);
-            let (name, word, closer) = (&row.name, change.word(), &change.closer);
-            format!("{name} {word} ({before:.1} to {after:.1}, closer in {closer})")
-        };
-        let changes: Vec<String> = self.before.rows.iter().zip(&self.changes).map(change).collect();
+        let changes: Vec<String> = self
+            .changes()
+            .map(|(row, change)| change.sentence(&row.name))
+            .collect();
         format!(
-            "With the effects the simulations come, by their mean distance over the runs: {}.",
+            "With the effects, by the mean distance over the runs: {}.",
             changes.join("; ")
         )
     }
 
-    /// `[{"simulation", "change", "before", "after", "closer_in_draws", "draws"}]`.
+    /// `[{"simulation", "change", "before", "after", "closer_in_draws", "draws", "draws_without_a_lap"}]`.
     pub(crate) fn changes_json(&self) -> Value {
-        let change = |(row, change): (&Row, &Change)| {
-            json!({
-                "simulation": row.key, "change": change.word(),
-                "before": change.before.json("distance"), "after": change.after.json("distance"),
-                "closer_in_draws": change.closer.times, "draws": change.closer.draws,
-            })
-        };
-        self.before.rows.iter().zip(&self.changes).map(change).collect()
+        self.changes()
+            .map(|(row, change)| change.json(&row.key))
+            .collect()
     }
 }
 
@@ -184,7 +254,29 @@ mod tests {
         let study = Study::new(measured, 1, 2, &silent).unwrap();
         for table in tables(&study, 1, &[], &silent).unwrap() {
             assert_eq!(table.before.json(), table.after.json());
-            assert!(table.changes.iter().all(|change| change.closer.times == 0));
+            assert!(
+                table
+                    .changes
+                    .iter()
+                    .all(|change| change.closer.times + change.stuck == 0)
+            );
         }
+    }
+
+    #[test]
+    fn draws_without_a_lap_are_counted_and_left_out() {
+        let draw = |distance: Option<f64>| vec![distance.map(|d| vec![d, d + 2.0])];
+        let before = vec![draw(Some(4.0)), draw(Some(6.0))];
+        let change = Change::new(&before, &vec![draw(None), draw(Some(1.0))], 0);
+        assert_eq!(
+            change.sentence("coarse"),
+            "coarse closer (6.0 to 2.0, closer in 1 of 1 draws; 1 of 2 draws close no lap and are left out)"
+        );
+        let stuck = Change::new(&before, &vec![draw(None), draw(None)], 0);
+        assert_eq!(stuck.sentence("coarse"), "coarse closes no lap in 2 draws");
+        assert_eq!(
+            (stuck.word(), stuck.json("k")["after"].is_null()),
+            ("closes no lap", true)
+        );
     }
 }

@@ -61,7 +61,10 @@ impl Probe {
 
     /// Whether the effect itself is a change in time.
     pub(super) fn drifts(&self) -> bool {
-        self.spec.params[self.size_index()].name == "per_s"
+        self.spec
+            .params
+            .get(self.size_index())
+            .is_some_and(|param| param.name == "per_s")
     }
 
     /// Which parameter sizes it.

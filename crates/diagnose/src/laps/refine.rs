@@ -16,7 +16,7 @@ use crate::Error;
 const ROUND_SETS: u64 = 10;
 
 /// Data sets simulated at the end.
-const FINAL_SETS: u64 = 48;
+const FINAL_SETS: u64 = 32;
 
 /// A hypothesis at its most likely sizes.
 #[derive(Debug, Clone)]

@@ -16,16 +16,6 @@ pub(super) struct Screened {
     pub(super) score: f64,
 }
 
-impl Screened {
-    /// Whether its size is the same always.
-    pub(super) fn is_constant(&self) -> bool {
-        self.hypothesis
-            .parts
-            .iter()
-            .all(|part| part.shape == Shape::Constant)
-    }
-}
-
 /// Half the logarithm of the number of laps for each fitted number (Schwarz 1978).
 pub(super) fn price(parameters: usize, laps: usize) -> f64 {
     0.5 * parameters as f64 * (laps as f64).ln()

@@ -52,7 +52,7 @@ impl Search<'_> {
 
     /// The best pairs, tried to the end.
     pub(super) fn pairs(&self) -> Vec<Found> {
-        const PAIRS: usize = 8;
+        const PAIRS: usize = 6;
         let pairs = self.atlas.screen_pairs(self.residual, PAIRS);
         self.try_all(pairs.iter().map(|pair| &pair.hypothesis))
     }
@@ -66,7 +66,7 @@ impl Search<'_> {
             let screened = left.map(|left| self.atlas.screen(&left)).unwrap_or_default();
             let others = shortlist(&screened)
                 .into_iter()
-                .filter(|s| s.is_constant() && !self.shares_effect(s, start));
+                .filter(|s| !self.shares_effect(s, start));
             others
                 .take(FURTHER)
                 .map(|other| start.hypothesis.with(&other.hypothesis))
@@ -85,16 +85,24 @@ impl Search<'_> {
     /// Causes without a name: the groups of basis functions that explain most with fewest coefficients, tried to the end.
     pub(super) fn unnamed(&self) -> Vec<Found> {
         let starts = self.atlas.screen_groups(self.simulate, self.residual);
-        self.try_all(starts.iter())
+        self.try_rounds(starts.iter(), &BEHIND[1..])
     }
 
     /// Descends from every hypothesis round by round, dropping those that fall behind, then settles those that may still be
     /// the best.
     fn try_all<'h>(&self, hypotheses: impl Iterator<Item = &'h Hypothesis>) -> Vec<Found> {
+        self.try_rounds(hypotheses, &BEHIND)
+    }
+
+    fn try_rounds<'h>(
+        &self,
+        hypotheses: impl Iterator<Item = &'h Hypothesis>,
+        rounds: &[(f64, f64)],
+    ) -> Vec<Found> {
         let mut alive: Vec<Descent> = hypotheses
             .map(|start| Descent::start(self.atlas, start))
             .collect();
-        for behind in BEHIND {
+        for behind in rounds {
             alive = (alive.into_par_iter())
                 .filter_map(|descent| self.atlas.descend(self.simulate, self.data, descent))
                 .collect();
