@@ -4,10 +4,17 @@
 
 mod case_study;
 mod cli;
+mod controls;
 mod declared;
 mod determinism;
 mod errors;
+#[path = "../benches/ground/mod.rs"]
+mod ground;
 mod iris;
+mod practice;
 mod support;
 mod sweep;
+mod trace_input;
+mod tracing;
+mod undeclared;
 mod world;

@@ -53,6 +53,10 @@ struct Constants {
 
 /// The verdict over all runs.
 pub(crate) fn decided(model: &Model, runs: &[&[LogRow]]) -> Decided {
+    let share = beyond_limit(model, runs);
+    if share > FORGIVEN {
+        return Decided::NoController { share };
+    }
     let choices: Vec<Vec<Choice>> = runs.iter().map(|rows| choices(model, rows)).collect();
     if choices.iter().all(Vec::is_empty) {
         return Decided::Unknown;
@@ -92,11 +96,30 @@ pub(crate) fn decided(model: &Model, runs: &[&[LogRow]]) -> Decided {
     .into_iter()
     .flatten()
     .collect();
-    if changed.is_empty() {
-        Decided::AsDeclared
-    } else {
-        Decided::Changed(changed)
+    let in_range = |candidate: &Candidate| candidate.setting.check(0).is_ok();
+    match changed.is_empty() {
+        true => Decided::AsDeclared,
+        // A gain or a speed a thousand times as large is another unit.
+        false if !changed.iter().all(in_range) => Decided::NoController { share: 1.0 },
+        false => Decided::Changed(changed),
     }
+}
+
+/// Share of the commands beyond the wheels' limit, to which every controller's commands are cut.
+fn beyond_limit(model: &Model, runs: &[&[LogRow]]) -> f64 {
+    let limit_m_s = model.machine.robot.wheel_speed_limit_m_s + 2e-5;
+    let commanded = runs
+        .iter()
+        .flat_map(|rows| rows.iter())
+        .filter(|row| row.commands());
+    let (mut all, mut beyond) = (0.0_f64, 0.0);
+    for row in commanded {
+        all += 1.0;
+        if row.command.left_m_s.abs().max(row.command.right_m_s.abs()) > limit_m_s {
+            beyond += 1.0;
+        }
+    }
+    beyond / all.max(1.0)
 }
 
 fn choices(model: &Model, rows: &[LogRow]) -> Vec<Choice> {

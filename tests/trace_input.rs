@@ -1,0 +1,267 @@
+//! Data that are short, broken, or not the model's: a clear error or a clear statement, never a wrong name.
+
+use std::fs;
+use std::path::PathBuf;
+
+use serde_json::Value;
+use sim::{Controller, Setting};
+
+use crate::ground;
+use crate::support::{Scratch, world_with};
+use crate::tracing::{Robot, holds, says, share_signatures, trace, try_trace};
+use crate::undeclared::{LIMP, LIMPING, limping};
+
+/// A robot that limps, of which little is measured.
+fn few_laps(laps: &[usize]) -> Robot {
+    let laps = laps.to_vec();
+    Robot { laps, ..limping() }
+}
+
+#[test]
+fn one_run_is_traced_and_what_it_cannot_tell_is_said() {
+    let scratch = Scratch::new();
+    few_laps(&[5]).record(&scratch, "set");
+    let found = trace(&scratch, "braitenberg", "set", &[]);
+    says(&found, "explained", &["wheel-asymmetry"]);
+    holds(&found["effects"][0], "ratio", LIMPING, 1.0);
+    let remark = found["remarks"][0].as_str().unwrap();
+    assert!(
+        remark.starts_with("One run only: whether the robot differs from run to run"),
+        "{remark}"
+    );
+    assert!(scratch.read("out/report.html").contains("One run only"));
+}
+
+#[test]
+fn runs_of_unequal_length_are_traced() {
+    let scratch = Scratch::new();
+    limping().logged(&[5, 3, 4]).record(&scratch, "set");
+    let found = trace(&scratch, "braitenberg", "set", &[]);
+    says(&found, "explained", &["wheel-asymmetry"]);
+    let expected = ["Run set/b has 3 of 5 laps.", "Run set/c has 4 of 5 laps."];
+    assert_eq!(found["remarks"], serde_json::json!(expected));
+}
+
+#[test]
+fn two_laps_are_too_few() {
+    let scratch = Scratch::new();
+    few_laps(&[3, 2]).record(&scratch, "set");
+    scratch.refuses(
+        &[
+            "trace",
+            "roduit2007",
+            "--measured",
+            "set",
+            "--out",
+            "out",
+            "--no-cache",
+            "--quiet",
+        ],
+        "run set/b has 2 whole laps after its first: at least 3 in every run are needed to trace anything",
+    );
+}
+
+/// Every row of a run's file, changed or left out.
+fn rewrite(scratch: &Scratch, run: &str, change: impl Fn(usize, Vec<String>) -> Option<Vec<String>>) {
+    let text = scratch.read(run);
+    let mut lines = text.lines();
+    let mut rewritten = lines.next().unwrap().to_owned() + "\n";
+    for (row, line) in lines.enumerate() {
+        let fields = line.split(',').map(str::to_owned).collect();
+        if let Some(fields) = change(row, fields) {
+            rewritten += &(fields.join(",") + "\n");
+        }
+    }
+    scratch.write(run, rewritten);
+}
+
+#[test]
+fn a_log_with_gaps_is_traced() {
+    let scratch = Scratch::new();
+    limping().logged(&[3; 3]).record(&scratch, "set");
+    let emptied = |fields: &mut [String]| fields.iter_mut().for_each(String::clear);
+    for (run, first) in [("set/run_a.csv", 700), ("set/run_b.csv", 1900)] {
+        rewrite(&scratch, run, |row, mut fields| {
+            match row.checked_sub(first)? {
+                0..30 => emptied(&mut fields[1..3]),
+                300..340 => emptied(&mut fields[3..11]),
+                600..650 => emptied(&mut fields[11..13]),
+                900..910 => return None,
+                _ => {}
+            }
+            Some(fields)
+        });
+    }
+    let found = trace(&scratch, "braitenberg", "set", &[]);
+    says(&found, "explained", &["wheel-asymmetry"]);
+    holds(&found["effects"][0], "ratio", LIMPING, 1.0);
+}
+
+/// A log whose columns from `first` on are multiplied: no controller gives those commands, and nothing is named.
+fn in_other_units(columns: std::ops::Range<usize>, factor: f64) -> Value {
+    let scratch = Scratch::new();
+    limping().logged(&[3; 2]).record(&scratch, "set");
+    for run in ["set/run_a.csv", "set/run_b.csv"] {
+        rewrite(&scratch, run, |_, mut fields| {
+            for field in &mut fields[columns.clone()] {
+                *field = format!("{:.5}", factor * field.parse::<f64>().unwrap());
+            }
+            Some(fields)
+        });
+    }
+    let found = trace(&scratch, "braitenberg", "set", &[]);
+    says(&found, "unexplained", &[]);
+    assert_eq!(found["residual"]["stage"], "decide", "{found:#}");
+    let decide = &found["logs"]["decide"];
+    assert_eq!(decide["verdict"], "no controller of this kind", "{decide}");
+    assert!(decide["commands_unexplained"].as_f64().unwrap() > 0.5, "{decide}");
+    assert!(scratch.read("out/report.html").contains("look at the units"));
+    found
+}
+
+#[test]
+fn speeds_in_millimetres_are_no_controllers() {
+    in_other_units(11..13, 1000.0);
+}
+
+#[test]
+fn readings_as_shares_of_full_scale_are_no_controllers() {
+    in_other_units(3..11, 1.0 / 4095.0);
+}
+
+#[test]
+fn positions_in_millimetres_are_refused() {
+    let scratch = Scratch::new();
+    few_laps(&[3]).record(&scratch, "set");
+    rewrite(&scratch, "set/run_a.csv", |_, mut fields| {
+        for field in &mut fields[1..3] {
+            *field = format!("{:.1}", 1000.0 * field.parse::<f64>().unwrap());
+        }
+        Some(fields)
+    });
+    scratch.refuses(
+        &["trace", "roduit2007", "--measured", "set", "--out", "out", "--no-cache", "--quiet"],
+        "set/run_a.csv: 0 whole laps, and the first is not analysed: at least two are needed; check the world, the \
+         driving direction ([declared] run.direction in dataset.toml) and the unit of x_m and y_m",
+    );
+}
+
+#[test]
+fn laps_of_another_world_are_refused() {
+    let scratch = Scratch::new();
+    few_laps(&[3]).record(&scratch, "set");
+    scratch.write(
+        "set/other.toml",
+        world_with("name = \"roduit2007\"", "name = \"other\""),
+    );
+    let description = scratch
+        .read("set/dataset.toml")
+        .replace("\"roduit2007\"", "\"other.toml\"");
+    scratch.write("set/dataset.toml", description);
+    scratch.refuses(
+        &[
+            "trace",
+            "roduit2007",
+            "--measured",
+            "set",
+            "--out",
+            "out",
+            "--no-cache",
+            "--quiet",
+        ],
+        "set: driven in another world (set/other.toml) than the model's",
+    );
+}
+
+#[test]
+fn sets_with_different_declarations_are_traced_together() {
+    let scratch = Scratch::new();
+    let robot = few_laps(&[4; 2]);
+    robot.record(&scratch, "set");
+    let reactive = Robot {
+        controller: Controller::Braitenberg {
+            speed_m_s: 0.05,
+            gain_per_count: 0.001,
+        },
+        declared: "controller.gain_per_count = 0.001",
+        ..robot
+    };
+    reactive.record(&scratch, "reactive");
+    let found = trace(&scratch, "braitenberg", "set", &["--measured", "reactive"]);
+    says(&found, "explained", &["wheel-asymmetry"]);
+    holds(&found["effects"][0], "ratio", LIMPING, 1.0);
+    let held_out = serde_json::json!(["set/a", "set/b", "reactive/a", "reactive/b"]);
+    assert_eq!(found["error"]["held_out"], held_out);
+}
+
+#[test]
+fn the_error_is_that_of_the_set_that_is_held_out() {
+    share_signatures("braitenberg");
+    let scratch = Scratch::new();
+    limping().record(&scratch, "set");
+    few_laps(&[6, 4]).record(&scratch, "unseen");
+    let found = trace(&scratch, "braitenberg", "set", &["--held-out", "unseen"]);
+    says(&found, "explained", &["wheel-asymmetry"]);
+    assert_eq!(
+        found["error"]["held_out"],
+        serde_json::json!(["unseen/a", "unseen/b"])
+    );
+    let [before, after, floor] =
+        ["before", "after", "floor"].map(|key| found["error"][key].as_f64().unwrap());
+    assert!(
+        after < 0.5 * before && after < 1.5 * floor,
+        "{before} {after} {floor}"
+    );
+
+    let other = Robot::with(Setting::constant(&LIMP, [LIMPING]));
+    let rule_based = Robot {
+        controller: ground::rule_based(),
+        laps: vec![3],
+        ..other
+    };
+    rule_based.record(&scratch, "others");
+    let ran = try_trace(&scratch, "braitenberg", "set", &["--held-out", "others"]);
+    assert_eq!(ran.status, Some(2), "{}", ran.stderr);
+    let said = "others: declares other settings ([declared], controller) than every --measured data set";
+    assert!(ran.stderr.contains(said), "{}", ran.stderr);
+}
+
+/// The files of signatures in a folder.
+fn kept(scratch: &Scratch, folder: &str) -> Vec<PathBuf> {
+    let entries = fs::read_dir(scratch.path(folder)).unwrap();
+    entries.map(|entry| entry.unwrap().path()).collect()
+}
+
+#[test]
+fn a_broken_file_of_signatures_is_made_anew() {
+    let scratch = Scratch::new();
+    few_laps(&[3]).record(&scratch, "set");
+    let traced = || {
+        let args = [
+            "trace",
+            "roduit2007",
+            "--measured",
+            "set",
+            "--out",
+            "out",
+            "--cache",
+            "kept",
+            "--json",
+        ];
+        scratch.json(args)
+    };
+    let first = traced();
+    let [file] = kept(&scratch, "kept").try_into().unwrap();
+    let whole = fs::read(&file).unwrap();
+    let mut flipped = whole.clone();
+    flipped[whole.len() / 2] ^= 1;
+    for broken in [&flipped, &whole[..whole.len() / 2], &[]] {
+        fs::write(&file, broken).unwrap();
+        assert_eq!(traced(), first);
+        assert!(
+            fs::read(&file).unwrap() == whole,
+            "{} is not mended",
+            file.display()
+        );
+    }
+}

@@ -1,0 +1,125 @@
+//! Effects that the program does not know, written here: it sees nothing of them but files.
+
+use sim::{Effect, Moment, Param, Setting, Spec, Stage, Vec2, WheelSpeeds};
+
+use crate::support::Scratch;
+use crate::tracing::{Robot, holds, never_a_listed_name, says, share_signatures, trace};
+
+/// A listed effect, written anew under another name.
+pub(crate) static LIMP: Spec = Spec {
+    name: "limp",
+    stage: Stage::Act,
+    summary: "the left wheel is larger than the right one",
+    params: &[Param::new("factor", "", 1.0, 0.5, 2.0)],
+    list: None,
+    build: || Box::new(Limp),
+};
+
+/// How much larger the left wheel is in these tests.
+pub(crate) const LIMPING: f64 = 1.02;
+
+#[derive(Debug)]
+struct Limp;
+
+impl Effect for Limp {
+    fn ground(&mut self, values: &[f64], _now: &Moment, wheels: WheelSpeeds) -> WheelSpeeds {
+        WheelSpeeds {
+            left_m_s: wheels.left_m_s * values[0],
+            ..wheels
+        }
+    }
+}
+
+/// A carpet on which wheels roll farther along its grain than across it: twice in each turn of the robot.
+static GRAIN: Spec = Spec {
+    name: "grain",
+    stage: Stage::Act,
+    summary: "wheels are faster along one direction of the floor, both ways",
+    params: &[Param::new("share", "", 0.0, -0.5, 0.5)],
+    list: None,
+    build: || Box::new(Grain),
+};
+
+#[derive(Debug)]
+struct Grain;
+
+impl Effect for Grain {
+    fn ground(&mut self, values: &[f64], now: &Moment, wheels: WheelSpeeds) -> WheelSpeeds {
+        let along = (2.0 * (now.pose.heading_rad() - 0.5)).cos();
+        wheels.map(|speed| speed * (1.0 + values[0] * along))
+    }
+}
+
+/// A wet place on the floor.
+static PUDDLE: Spec = Spec {
+    name: "puddle",
+    stage: Stage::Act,
+    summary: "the left wheel slips about one place of the floor",
+    params: &[Param::new("share", "", 0.0, 0.0, 0.9)],
+    list: None,
+    build: || Box::new(Puddle),
+};
+
+#[derive(Debug)]
+struct Puddle;
+
+impl Effect for Puddle {
+    fn ground(&mut self, values: &[f64], now: &Moment, wheels: WheelSpeeds) -> WheelSpeeds {
+        const RADIUS_M: f64 = 0.12;
+        let away = (now.pose.position - Vec2::new(1.0, 0.9)).length() / RADIUS_M;
+        WheelSpeeds {
+            left_m_s: wheels.left_m_s * (1.0 - values[0] * (-0.5 * away * away).exp()),
+            ..wheels
+        }
+    }
+}
+
+/// The robot whose left wheel is larger.
+pub(crate) fn limping() -> Robot {
+    Robot::with(Setting::constant(&LIMP, [LIMPING]))
+}
+
+#[test]
+fn a_listed_effect_under_another_name_is_named_from_laps() {
+    share_signatures("braitenberg");
+    let scratch = Scratch::new();
+    limping().record(&scratch, "set");
+    let found = trace(&scratch, "braitenberg", "set", &[]);
+    says(&found, "explained", &["wheel-asymmetry"]);
+    holds(&found["effects"][0], "ratio", LIMPING, 1.0);
+}
+
+#[test]
+fn a_listed_effect_under_another_name_is_named_from_logs() {
+    let scratch = Scratch::new();
+    limping().logged(&[3; 3]).record(&scratch, "set");
+    let found = trace(&scratch, "braitenberg", "set", &[]);
+    says(&found, "explained", &["wheel-asymmetry"]);
+    holds(&found["effects"][0], "ratio", LIMPING, 1.0);
+    assert_eq!(found["logs"]["decide"]["verdict"], "as declared", "{found:#}");
+    assert_eq!(found["logs"]["confirmed_by_laps"], true, "{found:#}");
+}
+
+#[test]
+fn a_carpet_with_a_grain_has_no_name_in_laps() {
+    share_signatures("braitenberg");
+    let scratch = Scratch::new();
+    Robot::with(Setting::constant(&GRAIN, [0.04])).record(&scratch, "set");
+    never_a_listed_name(&trace(&scratch, "braitenberg", "set", &[]), "act");
+}
+
+#[test]
+fn a_carpet_with_a_grain_has_no_name_in_logs() {
+    let scratch = Scratch::new();
+    let robot = Robot::with(Setting::constant(&GRAIN, [0.04])).logged(&[3; 3]);
+    robot.record(&scratch, "set");
+    never_a_listed_name(&trace(&scratch, "braitenberg", "set", &[]), "act");
+}
+
+#[test]
+fn a_wet_place_on_the_floor_has_no_name_in_logs() {
+    let scratch = Scratch::new();
+    let robot = Robot::with(Setting::constant(&PUDDLE, [0.2])).logged(&[3; 3]);
+    robot.record(&scratch, "set");
+    never_a_listed_name(&trace(&scratch, "braitenberg", "set", &[]), "act");
+}
