@@ -12,6 +12,7 @@ mod errors;
 mod ground;
 mod iris;
 mod practice;
+mod separate;
 mod support;
 mod sweep;
 mod trace_input;

@@ -1,0 +1,38 @@
+//! What laps do not tell apart is told apart by the experiment that the trace names.
+
+use serde_json::Value;
+use sim::{Setting, find};
+
+use crate::support::Scratch;
+use crate::tracing::{Robot, names, share_signatures, trace};
+
+fn alternatives(trace: &Value) -> Vec<&str> {
+    let list = trace["effects"][0]["alternatives"].as_array().unwrap();
+    list.iter().map(|name| name.as_str().unwrap()).collect()
+}
+
+#[test]
+fn the_experiment_that_is_named_tells_the_alternatives_apart() {
+    let scratch = Scratch::new();
+    share_signatures("braitenberg");
+    let robot = Robot::with(Setting::constant(find("reading-gain").unwrap(), [1.15]));
+    robot.record(&scratch, "laps");
+
+    let before = trace(&scratch, "braitenberg", "laps", &[]);
+    let rivals = alternatives(&before);
+    assert!(!rivals.is_empty(), "{before:#}");
+    let next = &before["separate_with"][0];
+    assert!(next["experiment"].as_str().unwrap().contains("log"), "{next:#}");
+    assert!(next["sigma"].as_f64().unwrap() > 5.0, "{next:#}");
+
+    robot.logged(&[3; 2]).record(&scratch, "logged");
+    let after = trace(&scratch, "braitenberg", "laps", &["--measured", "logged"]);
+    assert!(names(&after).len() == 1, "{after:#}");
+    // With a log the controller's gain is known exactly; gain and distance scale stay nearly one.
+    assert!(!alternatives(&after).contains(&"controller-gain"), "{after:#}");
+    assert!(
+        ["reading-gain", "distance-scale"].contains(&names(&after)[0]),
+        "{after:#}"
+    );
+    assert_eq!(after["logs"]["confirmed_by_laps"], true);
+}
