@@ -107,7 +107,7 @@ impl Atlas {
 /// Every explanation that was tried to the end, the answer first.
 fn explain(search: &Search<'_>, screened: &[Screened]) -> Vec<Found> {
     let mut found = search.singles(screened);
-    if !first_is(&found, suffices) {
+    if !first_is(&found, |best| suffices(best) || best.share > MOST) {
         found.extend(search.scans());
         sort(&mut found);
     }

@@ -12,8 +12,11 @@ use super::screen::price;
 use super::summary::Summary;
 use crate::Error;
 
-/// Data sets simulated at each point of a round.
-const ROUND_SETS: u64 = 10;
+/// Data sets simulated at each point of a round: with few numbers to fit, and with many, which have more points.
+const ROUND_SETS: [u64; 2] = [10, 6];
+
+/// Numbers to fit from which there are many.
+const MANY: usize = 5;
 
 /// Data sets simulated at the end.
 const FINAL_SETS: u64 = 32;
@@ -414,14 +417,15 @@ impl Atlas {
     }
 
     fn local(&self, simulate: &Simulate<'_>, hypothesis: &Hypothesis, freedoms: &[Freedom]) -> Option<Local> {
-        let center = self.evaluate(simulate, hypothesis, ROUND_SETS)?;
+        let sets = ROUND_SETS[usize::from(freedoms.len() >= MANY)];
+        let center = self.evaluate(simulate, hypothesis, sets)?;
         let mut sides = Vec::with_capacity(freedoms.len());
         for group in groups(freedoms) {
             let at = |sign: f64| {
                 let moves: Vec<(Freedom, f64)> = group.iter().map(|f| (*f, sign * f.step)).collect();
                 let moved = hypothesis.moved(self, &moves);
                 let by: Vec<f64> = group.iter().map(|f| moved.get(f) - hypothesis.get(f)).collect();
-                self.evaluate(simulate, &moved, ROUND_SETS)
+                self.evaluate(simulate, &moved, sets)
                     .map(|evaluated| (by, evaluated))
             };
             // Where the robot crashes on one side, the other one tells the slope.

@@ -52,14 +52,14 @@ impl Search<'_> {
 
     /// The best pairs, tried to the end.
     pub(super) fn pairs(&self) -> Vec<Found> {
-        const PAIRS: usize = 6;
+        const PAIRS: usize = 5;
         let pairs = self.atlas.screen_pairs(self.residual, PAIRS);
         self.try_all(pairs.iter().map(|pair| &pair.hypothesis))
     }
 
     /// The best explanations with what explains their remainder best beside them, tried to the end.
     pub(super) fn further(&self, best: &[Found]) -> Vec<Found> {
-        const STARTS: usize = 2;
+        const STARTS: usize = 1;
         const FURTHER: usize = 3;
         let starts = best.iter().take(STARTS).flat_map(|start| {
             let left = self.atlas.left_by(self.simulate, self.data, &start.hypothesis);
