@@ -194,7 +194,7 @@ impl Atlas {
         found: &Descent,
     ) -> Option<Refined> {
         let hypothesis = self.quantised(found.hypothesis.clone());
-        let end = self.evaluate(simulate, &hypothesis, FINAL_SETS)?;
+        let end = self.evaluate(simulate, &hypothesis, self.enough(FINAL_SETS, 1))?;
         self.judge(data, hypothesis, found.errors(), &end)
     }
 
@@ -208,6 +208,17 @@ impl Atlas {
             .map(|(g, (own, declared))| draws(g) * (own.log_det - declared.log_det))
             .sum();
         0.5 * (before - left - wider)
+    }
+
+    /// Data sets at each of so many points that determine the scatter of a lap too: short runs need more of them.
+    fn enough(&self, sets: u64, points: u64) -> u64 {
+        const TIMES: usize = 3;
+        let freedom: usize = (self.layout.laps.iter())
+            .map(|laps| laps.iter().map(|n| n - 2).sum())
+            .min()
+            .unwrap_or(1);
+        let needed = (TIMES * self.layout.lap).div_ceil(freedom) as u64;
+        sets.max(needed.div_ceil(points)).min(self.samples.len() as u64)
     }
 
     /// What a hypothesis pays for its fitted numbers and for the choice of its probes.
@@ -267,7 +278,7 @@ impl Atlas {
         data: &Expectation,
         hypothesis: &Hypothesis,
     ) -> Option<White> {
-        let evaluated = self.evaluate(simulate, hypothesis, FINAL_SETS)?;
+        let evaluated = self.evaluate(simulate, hypothesis, self.enough(FINAL_SETS, 1))?;
         Some(self.white(data, &evaluated.expectation))
     }
 
@@ -372,7 +383,7 @@ impl Atlas {
         effects: &[Setting],
     ) -> Option<White> {
         let alike = !effects.iter().any(|e| matches!(e.pattern, Pattern::ByRun(_)));
-        let end = self.simulated(simulate, effects, alike, FINAL_SETS)?;
+        let end = self.simulated(simulate, effects, alike, self.enough(FINAL_SETS, 1))?;
         let scatter = self.scatter_of(end.summaries.iter())?;
         Some(white(&scatter, &self.layout, data, &end.expectation) / (1.0 + end.error).sqrt())
     }
@@ -417,7 +428,7 @@ impl Atlas {
     }
 
     fn local(&self, simulate: &Simulate<'_>, hypothesis: &Hypothesis, freedoms: &[Freedom]) -> Option<Local> {
-        let sets = ROUND_SETS[usize::from(freedoms.len() >= MANY)];
+        let sets = self.enough(ROUND_SETS[usize::from(freedoms.len() >= MANY)], 3);
         let center = self.evaluate(simulate, hypothesis, sets)?;
         let mut sides = Vec::with_capacity(freedoms.len());
         for group in groups(freedoms) {
