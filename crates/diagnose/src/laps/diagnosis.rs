@@ -78,8 +78,8 @@ impl Atlas {
         let best = found.first().map(|best| &best.explanation);
         let verdict = best.map_or(Verdict::Unexplained, verdict_of);
         let indistinguishable = best.map_or(0, |best| {
-            // Candidates share their draws, so that half of the simulation's error is common to them.
-            let behind = ALTERNATIVE + 0.5 * found[0].gain_error;
+            // Candidates share their draws, so that much of the error is common to them.
+            let behind = ALTERNATIVE + found[0].gain_error;
             let alike =
                 |e: &Explanation| e.score > best.score - behind && e.effects.len() == best.effects.len();
             found.iter().take_while(|f| alike(&f.explanation)).count()

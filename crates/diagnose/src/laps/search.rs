@@ -35,7 +35,7 @@ const BEHIND: [(f64, f64); 3] = [(50.0, 0.2), (30.0, 0.05), (20.0, 0.015)];
 impl Search<'_> {
     /// The best single effects, tried to the end, best first.
     pub(super) fn singles(&self, screened: &[Screened]) -> Vec<Found> {
-        self.try_all(shortlist(screened).iter().map(|s| &s.hypothesis))
+        self.try_all(self.shortlist(screened).iter().map(|s| &s.hypothesis))
     }
 
     /// Effects whose action jumps with their size, at the best of many sizes: derivatives say nothing of them.
@@ -52,7 +52,7 @@ impl Search<'_> {
 
     /// The best pairs, tried to the end.
     pub(super) fn pairs(&self) -> Vec<Found> {
-        const PAIRS: usize = 5;
+        const PAIRS: usize = 8;
         let pairs = self.atlas.screen_pairs(self.residual, PAIRS);
         self.try_all(pairs.iter().map(|pair| &pair.hypothesis))
     }
@@ -64,7 +64,8 @@ impl Search<'_> {
         let starts = best.iter().take(STARTS).flat_map(|start| {
             let left = self.atlas.left_by(self.simulate, self.data, &start.hypothesis);
             let screened = left.map(|left| self.atlas.screen(&left)).unwrap_or_default();
-            let others = shortlist(&screened)
+            let others = self
+                .shortlist(&screened)
                 .into_iter()
                 .filter(|s| !self.shares_effect(s, start));
             others
@@ -74,6 +75,30 @@ impl Search<'_> {
         });
         let starts: Vec<Hypothesis> = starts.collect();
         self.try_all(starts.iter())
+    }
+
+    /// The screened hypotheses worth a simulation: each probe in its best pattern, of one effect the best two.
+    fn shortlist<'s>(&self, screened: &'s [Screened]) -> Vec<&'s Screened> {
+        const MOST: usize = 7;
+        const OF_ONE_EFFECT: usize = 2;
+        let Some(best) = screened.first() else {
+            return Vec::new();
+        };
+        let probe = |s: &Screened| s.hypothesis.parts[0].probe;
+        let spec = |s: &Screened| self.atlas.probes[probe(s)].spec;
+        let mut list: Vec<&Screened> = Vec::new();
+        for candidate in screened {
+            let hopeless = candidate.score < 0.7 * best.score - 20.0;
+            if list.len() == MOST || hopeless {
+                break;
+            }
+            let seen = list.iter().any(|s| probe(s) == probe(candidate));
+            let alike = list.iter().filter(|s| spec(s) == spec(candidate)).count();
+            if !seen && alike < OF_ONE_EFFECT {
+                list.push(candidate);
+            }
+        }
+        list
     }
 
     fn shares_effect(&self, screened: &Screened, found: &Found) -> bool {
@@ -154,25 +179,4 @@ impl Search<'_> {
 /// Best first.
 pub(super) fn sort(found: &mut [Found]) {
     found.sort_by(|a, b| b.explanation.score.total_cmp(&a.explanation.score));
-}
-
-/// The screened hypotheses worth a simulation: each probe in its best pattern.
-fn shortlist(screened: &[Screened]) -> Vec<&Screened> {
-    const MOST: usize = 7;
-    let Some(best) = screened.first() else {
-        return Vec::new();
-    };
-    let mut list: Vec<&Screened> = Vec::new();
-    for candidate in screened {
-        let probe = candidate.hypothesis.parts[0].probe;
-        let seen = list.iter().any(|s| s.hypothesis.parts[0].probe == probe);
-        let hopeless = candidate.score < 0.7 * best.score - 20.0;
-        if list.len() == MOST || hopeless {
-            break;
-        }
-        if !seen {
-            list.push(candidate);
-        }
-    }
-    list
 }
