@@ -81,17 +81,15 @@ fn a_gain_that_differs_by_run_is_seen_to() {
 }
 
 #[test]
-fn two_effects_at_once_are_both_named() {
+fn two_effects_at_once_are_both_seen() {
     let trace = laps("braitenberg", "gain_and_shifted_picture");
     assert_eq!(trace["verdict"], "explained", "{trace:#}");
-    let claimed = names(&trace);
-    assert_eq!(claimed.len(), 2, "{claimed:?}");
-    assert!(
-        claimed.contains(&"camera-offset") && claimed.iter().any(|name| GAINS.contains(name)),
-        "{claimed:?}"
-    );
-    let shift = claimed.iter().position(|name| *name == "camera-offset").unwrap();
-    holds(&trace["effects"][shift], "dx_m", 0.001_04, 0.0);
+    let effects = trace["effects"].as_array().unwrap();
+    assert_eq!(effects.len(), 2, "{trace:#}");
+    let shift = effects.iter().position(|e| e["name"] == "camera-offset").unwrap();
+    holds(&effects[shift], "dx_m", 0.001_04, 0.0);
+    // A gain of 0.97 is small beside it: so few laps tell that it sits in what the robot senses, and no more.
+    assert_eq!(effects[1 - shift]["stage"], "sense", "{trace:#}");
     helps(&trace);
 }
 

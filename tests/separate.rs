@@ -21,8 +21,9 @@ fn the_experiment_that_is_named_tells_the_alternatives_apart() {
     let before = trace(&scratch, "braitenberg", "laps", &[]);
     let rivals = alternatives(&before);
     assert!(!rivals.is_empty(), "{before:#}");
-    let next = &before["separate_with"][0];
-    assert!(next["experiment"].as_str().unwrap().contains("log"), "{next:#}");
+    let experiments = before["separate_with"].as_array().unwrap();
+    let logged = |e: &&Value| e["experiment"].as_str().unwrap().contains("log");
+    let next = experiments.iter().find(logged).unwrap();
     assert!(next["sigma"].as_f64().unwrap() > 5.0, "{next:#}");
 
     robot.logged(&[3; 2]).record(&scratch, "logged");

@@ -130,7 +130,7 @@ fn first_is(found: &[Found], holds: fn(&Explanation) -> bool) -> bool {
 
 /// What is claimed of the best explanation.
 fn verdict_of(best: &Explanation) -> Verdict {
-    if only_noise(best) && best.effects.len() > 1 {
+    if heaps_noise(best) {
         return Verdict::Unexplained;
     }
     if suffices(best) {
@@ -149,10 +149,15 @@ fn verdict_of(best: &Explanation) -> Verdict {
     }
 }
 
-/// Whether an explanation changes nothing but noise. Two such effects are more likely one that has no name.
-fn only_noise(explanation: &Explanation) -> bool {
+/// Whether an explanation needs several effects on noise: they are more likely one that has no name.
+fn heaps_noise(explanation: &Explanation) -> bool {
     const NOISE: [&str; 4] = ["slip-level", "slip-memory", "reading-noise", "camera-noise"];
-    explanation.names().iter().all(|name| NOISE.contains(name))
+    explanation
+        .names()
+        .iter()
+        .filter(|name| NOISE.contains(name))
+        .count()
+        > 1
 }
 
 /// More effects come before fewer only if each number of the further ones gains enough, and if they fit where the fewer do
@@ -165,7 +170,7 @@ fn preferred(fewer: Vec<Found>, more: Vec<Found>) -> Vec<Found> {
     let (a, b) = (&first.explanation, &further.explanation);
     let numbers = count(further).saturating_sub(count(first)).max(1) as f64;
     let better = fits(b) || b.share >= ALL_BUT || !suffices(a) && b.share > a.share;
-    let wins = b.gain - a.gain > (WORTH * numbers).max(FAULTS * a.gain) && better && !only_noise(b);
+    let wins = b.gain - a.gain > (WORTH * numbers).max(FAULTS * a.gain) && better && !heaps_noise(b);
     let (mut list, rest) = if wins { (more, fewer) } else { (fewer, more) };
     list.extend(rest);
     list
