@@ -2,7 +2,7 @@
 
 use anyhow::Result;
 use diagnose::{Candidate, Explanation, LogRow, Rival, log_separation, separations};
-use sim::{Controller, Setting, Step, Streams};
+use sim::{Controller, Setting, Stage, Step, Streams};
 use track::Lap;
 
 use super::Trace;
@@ -171,18 +171,21 @@ fn by_logs(
 ) -> Option<Vec<(String, f64)>> {
     let rows = logs(setup, &first_runs(&answer.settings()), seed)?;
     let runs: Vec<&[LogRow]> = rows.iter().map(Vec::as_slice).collect();
-    let found = others
-        .iter()
-        .map(|other| {
-            log_separation(
-                &setup.model,
-                &setup.scene,
-                &runs,
-                &answer.settings(),
-                &other.settings(),
-            )
-        })
-        .collect();
+    // Commands follow from readings exactly: a log tells at once whether it is the controller.
+    let decides = |e: &Explanation| e.effects.iter().any(|c| c.stage() == Stage::Decide);
+    let separation = |other: &&Explanation| {
+        if decides(answer) != decides(other) {
+            return None;
+        }
+        log_separation(
+            &setup.model,
+            &setup.scene,
+            &runs,
+            &answer.settings(),
+            &other.settings(),
+        )
+    };
+    let found = others.iter().map(separation).collect();
     Some(named(others, found))
 }
 

@@ -118,8 +118,9 @@ impl Atlas {
         *hypothesis = hypothesis.moved(self, &by);
         for (i, freedom) in freedoms.iter_mut().enumerate() {
             errors[i] = (covariance[(i, i)] * (1.0 + local.error)).sqrt();
-            // The parabola should hold where the answer may lie.
-            let reach = (3.0 * errors[i]).max(moves[i].abs());
+            // The parabola should hold where the answer may lie, and be wide enough for the noise of its points not to
+            // pass for information.
+            let reach = (10.0 * errors[i]).max(moves[i].abs());
             freedom.step = reach.clamp(0.2 * freedom.step, freedom.step);
         }
         Some(Descent {
