@@ -24,7 +24,12 @@ fn the_experiment_that_is_named_tells_the_alternatives_apart() {
     let experiments = before["separate_with"].as_array().unwrap();
     let logged = |e: &&Value| e["experiment"].as_str().unwrap().contains("log");
     let next = experiments.iter().find(logged).unwrap();
-    assert!(next["sigma"].as_f64().unwrap() > 5.0, "{next:#}");
+    // Gain and distance scale stay nearly one in a log too; the controller's gain does not.
+    let against = next["against"].as_array().unwrap();
+    assert!(
+        against.iter().any(|rival| rival["sigma"].as_f64().unwrap() > 5.0),
+        "{next:#}"
+    );
 
     robot.logged(&[3; 2]).record(&scratch, "logged");
     let after = trace(&scratch, "braitenberg", "laps", &["--measured", "logged"]);
