@@ -223,7 +223,7 @@ fn the_error_is_that_of_the_set_that_is_held_out() {
     rule_based.record(&scratch, "others");
     let ran = try_trace(&scratch, "braitenberg", "set", &["--held-out", "others"]);
     assert_eq!(ran.status, Some(2), "{}", ran.stderr);
-    let said = "others: declares other settings ([declared], controller) than every --measured data set";
+    let said = "others: driven by the rule-based controller, and the model's is braitenberg";
     assert!(ran.stderr.contains(said), "{}", ran.stderr);
 }
 

@@ -12,6 +12,9 @@ use crate::setup::Setup;
 
 /// Probability below which laps contradict what the logs say, if the answer does not explain most of it.
 const CONTRADICTS_P: f64 = 1e-5;
+/// Share of their expectation that the squares of the runs' differences must reach: an answer from logs whose robot scatters far
+/// more than the laps do is none.
+const LEAST_SCATTER: f64 = 0.8;
 /// Share of the laps' departure that an answer from logs must explain to stand.
 const CONFIRMED_SHARE: f64 = 0.8;
 
@@ -57,7 +60,11 @@ pub(crate) fn from_logs(
     let logs = diagnose_logs(&setup.model, &setup.scene, &runs)?;
     let (before, after) = atlas.confirm(simulate, laps, &logs.answer.settings())?;
     let confirmed = after.is_some_and(|after| {
-        after.omnibus_p() >= CONTRADICTS_P || after.excess() < (1.0 - CONFIRMED_SHARE) * before.excess()
+        let quiet =
+            after.quiet_p() < CONTRADICTS_P && after.runs.q < LEAST_SCATTER * after.runs.freedom as f64;
+        let explained =
+            after.omnibus_p() >= CONTRADICTS_P || after.excess() < (1.0 - CONFIRMED_SHARE) * before.excess();
+        explained && !quiet
     });
     Ok(FromLogs {
         logs,

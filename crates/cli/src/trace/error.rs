@@ -84,7 +84,9 @@ impl MeanLaps {
             .filter_map(|run| mean(run.iter().take(laps)))
             .map(|run| rms(&self.mean_m, &run))
             .collect();
-        distances.iter().sum::<f64>() / distances.len() as f64
+        // Each run is a part of the mean that it is held against.
+        let alone = distances.len() as f64 / (distances.len() as f64 - 1.0);
+        alone * distances.iter().sum::<f64>() / distances.len() as f64
     }
 }
 

@@ -14,7 +14,7 @@ use crate::setup::Setup;
 
 /// Shape of the data set that an experiment is judged by.
 const RUNS: usize = 4;
-const LAPS: usize = 20;
+const LAPS: usize = 8;
 /// Laps of each run with the robot's log: logs say more.
 const LOGGED_LAPS: usize = 3;
 /// Standard deviations at which two explanations are told apart.
@@ -44,10 +44,12 @@ impl Experiment {
             .fold(f64::INFINITY, f64::min)
     }
 
-    /// Laps that tell the answer from every rival; `None` if that would take more than ten times as many.
+    /// Laps that tell the answer from every rival; `None` if that would take too many.
     pub(crate) fn laps_needed(&self) -> Option<usize> {
+        /// More than anyone records.
+        const MOST: f64 = 1000.0;
         let needed = (self.laps as f64 * (ENOUGH / self.least()).powi(2)).ceil();
-        (needed <= 10.0 * self.laps as f64).then_some((needed as usize).max(RUNS))
+        (needed <= MOST).then_some((needed as usize).max(RUNS))
     }
 }
 
@@ -128,7 +130,7 @@ pub(crate) fn experiments(trace: &Trace, seed: u64) -> Result<Vec<Experiment>> {
             }));
         }
     }
-    found.retain(|experiment| experiment.least() > 0.5);
+    found.retain(|experiment| experiment.least() > 0.3);
     found.sort_by(|a, b| {
         (b.least() / (b.laps as f64).sqrt()).total_cmp(&(a.least() / (a.laps as f64).sqrt()))
     });

@@ -2,8 +2,9 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use serde::{Deserialize, Serialize};
+use statrs::function::gamma::digamma;
 
-use super::summary::{Recording, SECOND, Summary};
+use super::summary::{Recording, SECOND, Summary, stretches};
 
 /// Means of the summaries of simulated data sets, recording by recording.
 ///
@@ -113,8 +114,10 @@ pub(super) struct Scatter {
     second: Cholesky<f64, Dyn>,
     /// What the declaration leaves open, as a covariance of a run's mean lap times the number of laps.
     open: DMatrix<f64>,
-    /// log det of the covariance of one lap.
+    /// log det of the covariance of one lap, without bias.
     pub(super) log_det: f64,
+    /// Degrees of freedom of the covariance of one lap.
+    pub(super) freedom: f64,
 }
 
 impl Scatter {
@@ -128,10 +131,8 @@ impl Scatter {
             let deviation = &recording.second - &mean;
             second.ger(1.0 / (sets as f64 - 1.0), &deviation, &deviation, 1.0);
         }
-        let spread = inflation(sets - 1, SECOND)?;
-        let second = (second * spread).cholesky()?;
-        let size = recordings.clone().next()?.scatter.nrows();
-        Self::with(recordings, second, DMatrix::zeros(size, size))
+        let spread = inflation(sets as f64 - 1.0, SECOND)?;
+        Self::of_second(recordings, second * spread)
     }
 
     /// As [`Scatter::of`] from few recordings: the second-order numbers are taken to be independent of each other.
@@ -143,18 +144,37 @@ impl Scatter {
             let deviation = &recording.second - &mean;
             variances += deviation.component_mul(&deviation) / (sets - 1.0);
         }
-        let size = recordings.clone().next()?.scatter.nrows();
-        let second = DMatrix::from_diagonal(&variances).cholesky()?;
-        Self::with(recordings, second, DMatrix::zeros(size, size))
+        Self::of_second(recordings, DMatrix::from_diagonal(&variances))
     }
 
-    /// The scatter of the laps of these recordings, with another's scatter of the second-order numbers, which few data sets
-    /// do not determine.
-    pub(super) fn of_laps<'a>(
+    fn of_second<'a>(
+        recordings: impl Iterator<Item = &'a Recording> + Clone,
+        second: DMatrix<f64>,
+    ) -> Option<Self> {
+        let size = recordings.clone().next()?.scatter.nrows();
+        let (lap, freedom) = pooled(recordings, size);
+        Self::with(lap, freedom, second.cholesky()?, DMatrix::zeros(size, size))
+    }
+
+    /// The scatter of the laps of these recordings where they are too few to know it well: drawn towards another one's
+    /// correlations as far as they do not contradict them (Ledoit and Wolf 2004); the scatter of the second-order numbers is
+    /// the other's.
+    pub(super) fn near<'a>(
         recordings: impl Iterator<Item = &'a Recording> + Clone,
         other: &Self,
     ) -> Option<Self> {
-        Self::with(recordings, other.second.clone(), other.open.clone())
+        let (own, freedom) = pooled(recordings, other.open.nrows());
+        let size = own.nrows() as f64;
+        let target = scaled(&other.of_lap(), &own);
+        let root = target.clone().cholesky()?;
+        let left = root.l().solve_lower_triangular(&own)?;
+        let against = root.l().solve_lower_triangular(&left.transpose())?;
+        let apart = (against - DMatrix::identity(own.nrows(), own.nrows())).norm_squared();
+        let by_chance = size * (size + 1.0) / freedom;
+        let share = (by_chance / apart).min(1.0);
+        let freedom = ((1.0 - share).powi(2) / freedom + share.powi(2) / other.freedom).recip();
+        let lap = own * (1.0 - share) + target * share;
+        Self::with(lap, freedom, other.second.clone(), other.open.clone())
     }
 
     /// This scatter where the declaration leaves the mean lap open: `directions` are as likely as not, in units of a lap;
@@ -170,27 +190,19 @@ impl Scatter {
         Some(Self { mean, open, ..self })
     }
 
-    fn with<'a>(
-        recordings: impl Iterator<Item = &'a Recording> + Clone,
-        second: Cholesky<f64, Dyn>,
-        open: DMatrix<f64>,
-    ) -> Option<Self> {
-        let size = open.nrows();
-        let (mut lap, mut freedom) = (DMatrix::zeros(size, size), 0);
-        for recording in recordings {
-            lap += &recording.scatter;
-            freedom += recording.freedom;
-        }
-        let lap = lap * (inflation(freedom, size)? / freedom as f64);
-        let mean = (&lap + &open).cholesky()?;
+    /// From a covariance of one lap that was estimated with so many degrees of freedom.
+    fn with(lap: DMatrix<f64>, freedom: f64, second: Cholesky<f64, Dyn>, open: DMatrix<f64>) -> Option<Self> {
+        let size = lap.nrows();
+        let enlarged = &lap * inflation(freedom, size)?;
         let lap = lap.cholesky()?;
-        let log_det = 2.0 * lap.l_dirty().diagonal().iter().map(|x| x.ln()).sum::<f64>();
+        let logarithms = lap.l_dirty().diagonal().map(f64::ln).sum();
         Some(Self {
-            lap,
-            mean,
+            mean: (&enlarged + &open).cholesky()?,
+            lap: enlarged.cholesky()?,
             second,
             open,
-            log_det,
+            log_det: 2.0 * logarithms - log_det_bias(freedom, size),
+            freedom,
         })
     }
 
@@ -227,8 +239,42 @@ fn whiten(covariance: &Cholesky<f64, Dyn>, vector: &DVector<f64>) -> DVector<f64
     white
 }
 
+/// The covariance of one lap within the runs of some recordings, and its degrees of freedom.
+fn pooled<'a>(recordings: impl Iterator<Item = &'a Recording>, size: usize) -> (DMatrix<f64>, f64) {
+    let (mut lap, mut freedom) = (DMatrix::zeros(size, size), 0);
+    for recording in recordings {
+        lap += &recording.scatter;
+        freedom += recording.freedom;
+    }
+    let freedom = freedom as f64;
+    (lap / freedom, freedom)
+}
+
+/// A covariance with the variances of another, stretch by stretch.
+fn scaled(covariance: &DMatrix<f64>, to: &DMatrix<f64>) -> DMatrix<f64> {
+    let mut factors = DVector::zeros(covariance.nrows());
+    for stretch in stretches(covariance.nrows()) {
+        let ratio = (stretch.clone())
+            .map(|i| to[(i, i)] / covariance[(i, i)])
+            .sum::<f64>()
+            / stretch.len() as f64;
+        factors.rows_mut(stretch.start, stretch.len()).fill(ratio.sqrt());
+    }
+    DMatrix::from_fn(covariance.nrows(), covariance.ncols(), |i, j| {
+        factors[i] * covariance[(i, j)] * factors[j]
+    })
+}
+
 /// What makes the inverse of a covariance estimated with `freedom` degrees of freedom in `size` dimensions unbiased (the mean
 /// of the inverse Wishart distribution); `None` where it has none.
-fn inflation(freedom: usize, size: usize) -> Option<f64> {
-    (freedom > size + 1).then(|| freedom as f64 / (freedom - size - 1) as f64)
+fn inflation(freedom: f64, size: usize) -> Option<f64> {
+    let left = freedom - size as f64 - 1.0;
+    (left > 0.0).then(|| freedom / left)
+}
+
+/// Expectation of the log determinant of a covariance estimated with `freedom` degrees of freedom, less the true one (Wishart).
+fn log_det_bias(freedom: f64, size: usize) -> f64 {
+    (0..size)
+        .map(|i| digamma((freedom - i as f64) / 2.0) - (freedom / 2.0).ln())
+        .sum()
 }

@@ -8,6 +8,7 @@ mod expectation;
 mod groups;
 mod hypothesis;
 mod layout;
+mod likelihood;
 mod pairs;
 mod probe;
 mod refine;

@@ -1,5 +1,7 @@
 //! The size of a hypothesis by simulation, and how well it then explains the data.
 
+use std::ops::Range;
+
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use sim::{Pattern, Setting};
@@ -8,12 +10,14 @@ use super::atlas::{Atlas, Simulate, White, white};
 use super::expectation::{Expectation, Scatter};
 use super::hypothesis::{Freedom, Hypothesis, Part, Shape};
 use super::layout::Layout;
+use super::likelihood::{Doubt, Evaluated, Fit};
 use super::screen::price;
 use super::summary::Summary;
 use crate::Error;
 
-/// Data sets simulated at each point of a round: with few numbers to fit, and with many, which have more points.
-const ROUND_SETS: [u64; 2] = [10, 6];
+/// Data sets simulated at each point of the first round, and of the later ones: with few numbers to fit, and with many,
+/// which have more points.
+const ROUND_SETS: [[u64; 2]; 2] = [[4, 3], [10, 6]];
 
 /// Numbers to fit from which there are many.
 const MANY: usize = 5;
@@ -21,20 +25,24 @@ const MANY: usize = 5;
 /// Data sets simulated at the end.
 const FINAL_SETS: u64 = 32;
 
+/// Data sets simulated of hypotheses that explain nearly as much as the best.
+const CLOSE_SETS: u64 = 96;
+
 /// A hypothesis at its most likely sizes.
 #[derive(Debug, Clone)]
 pub(super) struct Refined {
     pub(super) hypothesis: Hypothesis,
     /// Standard errors of the fitted numbers, the simulation's own error included.
     pub(super) errors: Vec<(Freedom, f64)>,
-    /// The data less what is expected, in units of this hypothesis' own scatter and the simulation's error.
-    pub(super) residual: White,
-    /// Log-likelihood gained over the declared model.
-    pub(super) gain: f64,
-    /// `gain` less the price of the fitted numbers.
+    pub(super) fit: Fit,
+    /// The gain less the price of the fitted numbers.
     pub(super) score: f64,
-    /// Standard deviation of the gain for the simulation's own error.
-    pub(super) gain_error: f64,
+}
+
+/// A hypothesis at its most likely sizes with what was simulated to judge it.
+pub(super) struct Settled {
+    pub(super) refined: Refined,
+    evaluated: Evaluated,
 }
 
 impl Refined {
@@ -42,15 +50,6 @@ impl Refined {
     pub(super) fn errors_of(&self, part: usize, atlas: &Atlas) -> Vec<f64> {
         self.hypothesis.parts[part].errors(part, &self.errors, atlas)
     }
-}
-
-/// A hypothesis simulated.
-#[derive(Clone)]
-struct Evaluated {
-    expectation: Expectation,
-    /// Variance of the expectation in units of a data set's own.
-    error: f64,
-    summaries: Vec<Summary>,
 }
 
 /// A hypothesis on its way to its most likely sizes.
@@ -63,6 +62,8 @@ pub(super) struct Descent {
     pub(super) score: f64,
     /// Whether the last round moved nothing by more than half its error.
     settled: bool,
+    /// Whether no round was made yet.
+    first: bool,
 }
 
 impl Descent {
@@ -75,6 +76,7 @@ impl Descent {
             freedoms,
             score: f64::NEG_INFINITY,
             settled: false,
+            first: true,
         }
     }
 
@@ -105,19 +107,20 @@ impl Atlas {
             hypothesis,
             freedoms,
             errors,
+            first,
             ..
         } = &mut descent;
-        let local = self.local(simulate, hypothesis, freedoms)?;
+        let local = self.local(simulate, hypothesis, freedoms, ROUND_SETS[usize::from(!*first)])?;
         let target = white(&local.scatter, &self.layout, data, &local.center);
         let (moves, covariance) = nearest(&local.columns, &target, freedoms);
-        let left = left_of(&local.columns, &target, &moves).norm_squared() / (1.0 + local.error);
-        let gain = self.gain(data, left, &local.scatter);
-        let score = hypothesis.worth(gain) - self.price_of(hypothesis);
+        let left = left_of(&local.columns, &target, &moves);
+        let fit = self.fit_of(data, left, &local.scatter, local.doubt);
+        let score = hypothesis.worth(fit.gain) - self.price_of(hypothesis);
         let settled = (0..moves.len()).all(|i| moves[i].abs() < 0.5 * covariance[(i, i)].sqrt());
         let by: Vec<(Freedom, f64)> = freedoms.iter().copied().zip(moves.iter().copied()).collect();
         *hypothesis = hypothesis.moved(self, &by);
         for (i, freedom) in freedoms.iter_mut().enumerate() {
-            errors[i] = (covariance[(i, i)] * (1.0 + local.error)).sqrt();
+            errors[i] = (covariance[(i, i)] * (1.0 + local.doubt.error)).sqrt();
             // The parabola should hold where the answer may lie, and be wide enough for the noise of its points not to
             // pass for information.
             let reach = (10.0 * errors[i]).max(moves[i].abs());
@@ -126,6 +129,7 @@ impl Atlas {
         Some(Descent {
             score,
             settled,
+            first: false,
             ..descent
         })
     }
@@ -139,7 +143,7 @@ impl Atlas {
         hypothesis: &Hypothesis,
     ) -> Result<Vec<Vec<Setting>>, Error> {
         let freedoms = hypothesis.freedoms(self);
-        let local = self.local(simulate, hypothesis, &freedoms);
+        let local = self.local(simulate, hypothesis, &freedoms, ROUND_SETS[1]);
         let fit_without = |run: usize| {
             let found = match &local {
                 Some(local) => self.fit_without(run, local, runs, hypothesis, &freedoms)?,
@@ -193,22 +197,40 @@ impl Atlas {
         simulate: &Simulate<'_>,
         data: &Expectation,
         found: &Descent,
-    ) -> Option<Refined> {
+    ) -> Option<Settled> {
         let hypothesis = self.quantised(found.hypothesis.clone());
         let end = self.evaluate(simulate, &hypothesis, self.enough(FINAL_SETS, 1))?;
-        self.judge(data, hypothesis, found.errors(), &end)
+        self.settled(data, hypothesis, found.errors(), end)
     }
 
-    /// Log-likelihood gained over the declared model by a hypothesis that leaves a squared distance of `left` in units of its own
-    /// scatter.
-    fn gain(&self, data: &Expectation, left: f64, scatter: &[Scatter]) -> f64 {
-        let before = self.white(data, &self.null).norm_squared();
-        // Every run's mean lap and every recording's trend are each a draw of one lap's covariance.
-        let draws = |g: usize| (self.layout.laps[g].len() + 1) as f64;
-        let wider: f64 = (scatter.iter().zip(&self.scatter).enumerate())
-            .map(|(g, (own, declared))| draws(g) * (own.log_det - declared.log_det))
-            .sum();
-        0.5 * (before - left - wider)
+    /// The same hypothesis simulated more often, to tell it from others that explain as much.
+    pub(super) fn settle_more(
+        &self,
+        simulate: &Simulate<'_>,
+        data: &Expectation,
+        settled: Settled,
+    ) -> Option<Settled> {
+        let Settled { refined, evaluated } = settled;
+        let more = self.evaluate_more(simulate, &refined.hypothesis, evaluated, CLOSE_SETS)?;
+        self.settled(data, refined.hypothesis, refined.errors, more)
+    }
+
+    fn settled(
+        &self,
+        data: &Expectation,
+        hypothesis: Hypothesis,
+        errors: Vec<(Freedom, f64)>,
+        evaluated: Evaluated,
+    ) -> Option<Settled> {
+        let fit = self.fit(data, &evaluated)?;
+        let score = hypothesis.worth(fit.gain) - self.price_of(&hypothesis);
+        let refined = Refined {
+            hypothesis,
+            errors,
+            fit,
+            score,
+        };
+        Some(Settled { refined, evaluated })
     }
 
     /// Data sets at each of so many points that determine the scatter of a lap too: short runs need more of them.
@@ -228,14 +250,6 @@ impl Atlas {
         price(hypothesis.freedoms(self).len(), self.layout.total_laps()) + choices
     }
 
-    /// The scatter of simulated data sets, recording by recording.
-    fn scatter_of<'a>(&self, summaries: impl Iterator<Item = &'a Summary> + Clone) -> Option<Vec<Scatter>> {
-        let of = |(g, declared): (usize, &Scatter)| {
-            Scatter::of_laps(summaries.clone().map(move |summary| &summary.0[g]), declared)
-        };
-        self.scatter.iter().enumerate().map(of).collect()
-    }
-
     /// Sizes that come in steps brought to the nearest.
     fn quantised(&self, mut hypothesis: Hypothesis) -> Hypothesis {
         for part in &mut hypothesis.parts {
@@ -248,28 +262,6 @@ impl Atlas {
             }
         }
         hypothesis
-    }
-
-    /// How well a simulated hypothesis explains the data.
-    fn judge(
-        &self,
-        data: &Expectation,
-        hypothesis: Hypothesis,
-        errors: Vec<(Freedom, f64)>,
-        end: &Evaluated,
-    ) -> Option<Refined> {
-        let scatter = self.scatter_of(end.summaries.iter())?;
-        let residual = white(&scatter, &self.layout, data, &end.expectation) / (1.0 + end.error).sqrt();
-        let gain = self.gain(data, residual.norm_squared(), &scatter);
-        let score = hypothesis.worth(gain) - self.price_of(&hypothesis);
-        Some(Refined {
-            gain_error: (residual.norm_squared() * end.error).sqrt(),
-            hypothesis,
-            errors,
-            residual,
-            gain,
-            score,
-        })
     }
 
     /// What a hypothesis leaves of the data, in units of the declared model's scatter; `None` where the robot crashes.
@@ -385,14 +377,24 @@ impl Atlas {
     ) -> Option<White> {
         let alike = !effects.iter().any(|e| matches!(e.pattern, Pattern::ByRun(_)));
         let end = self.simulated(simulate, effects, alike, self.enough(FINAL_SETS, 1))?;
-        let scatter = self.scatter_of(end.summaries.iter())?;
-        Some(white(&scatter, &self.layout, data, &end.expectation) / (1.0 + end.error).sqrt())
+        Some(self.fit(data, &end)?.residual)
     }
 
-    /// Simulates a hypothesis. What the draws of these data sets did to the declared model is taken off as far as it
-    /// helps (a control variate).
     fn evaluate(&self, simulate: &Simulate<'_>, hypothesis: &Hypothesis, sets: u64) -> Option<Evaluated> {
         self.simulated(simulate, &hypothesis.settings(self), hypothesis.alike(), sets)
+    }
+
+    fn evaluate_more(
+        &self,
+        simulate: &Simulate<'_>,
+        hypothesis: &Hypothesis,
+        evaluated: Evaluated,
+        sets: u64,
+    ) -> Option<Evaluated> {
+        let mut summaries = evaluated.summaries;
+        let done = summaries.len() as u64;
+        summaries.extend(self.summaries(simulate, &hypothesis.settings(self), done..sets.max(done))?);
+        Some(self.evaluated(summaries, hypothesis.alike()))
     }
 
     fn simulated(
@@ -402,13 +404,28 @@ impl Atlas {
         alike: bool,
         sets: u64,
     ) -> Option<Evaluated> {
-        self.spent.add(sets);
-        let summaries: Vec<Summary> = (0..sets)
-            .into_par_iter()
+        let summaries = self.summaries(simulate, settings, 0..sets)?;
+        Some(self.evaluated(summaries, alike))
+    }
+
+    fn summaries(
+        &self,
+        simulate: &Simulate<'_>,
+        settings: &[Setting],
+        sets: Range<u64>,
+    ) -> Option<Vec<Summary>> {
+        self.spent.add(sets.end - sets.start);
+        sets.into_par_iter()
             .map(|set| self.summary(simulate, settings, set))
-            .collect::<Option<_>>()?;
+            .collect()
+    }
+
+    /// What simulated data sets say of their hypothesis. What their draws did to the declared model is taken off as far as
+    /// it helps (a control variate).
+    fn evaluated(&self, summaries: Vec<Summary>, alike: bool) -> Evaluated {
+        let sets = summaries.len();
         let mean = Expectation::of(summaries.iter(), alike);
-        let declared = &self.samples[..sets as usize];
+        let declared = &self.samples[..sets];
         let declared_mean = Expectation::mean(declared, alike);
         let (mut both, mut own) = (0.0, 0.0);
         for (summary, sample) in summaries.iter().zip(declared) {
@@ -421,15 +438,23 @@ impl Atlas {
         let share = (both / own).clamp(0.0, 1.0);
         let expectation = mean.moved(share, &declared_mean, &self.null);
         let error = (1.0 - share * share) / sets as f64 + share * share / self.samples.len() as f64;
-        Some(Evaluated {
+        Evaluated {
             expectation,
-            error,
+            doubt: Doubt { error, alike },
             summaries,
-        })
+        }
     }
 
-    fn local(&self, simulate: &Simulate<'_>, hypothesis: &Hypothesis, freedoms: &[Freedom]) -> Option<Local> {
-        let sets = self.enough(ROUND_SETS[usize::from(freedoms.len() >= MANY)], 3);
+    /// A hypothesis and its neighbourhood, each point simulated with so many data sets where there are few numbers to fit,
+    /// and where there are many.
+    fn local(
+        &self,
+        simulate: &Simulate<'_>,
+        hypothesis: &Hypothesis,
+        freedoms: &[Freedom],
+        sets: [u64; 2],
+    ) -> Option<Local> {
+        let sets = self.enough(sets[usize::from(freedoms.len() >= MANY)], 3);
         let center = self.evaluate(simulate, hypothesis, sets)?;
         let mut sides = Vec::with_capacity(freedoms.len());
         for group in groups(freedoms) {
@@ -470,7 +495,7 @@ impl Atlas {
         }
         Some(Local {
             center: center.expectation,
-            error: center.error,
+            doubt: center.doubt,
             scatter,
             columns,
         })
@@ -513,7 +538,7 @@ fn of_run(action: &White, run: usize, layout: &Layout) -> White {
 /// A hypothesis and its neighbourhood.
 struct Local {
     center: Expectation,
-    error: f64,
+    doubt: Doubt,
     scatter: Vec<Scatter>,
     columns: Vec<Column>,
 }

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::atlas::{Atlas, Simulate, White};
 use super::expectation::Expectation;
 use super::hypothesis::{Hypothesis, Part};
-use super::refine::{Descent, Refined};
+use super::refine::{Descent, Refined, Settled};
 use super::screen::Screened;
 use super::tests_of_fit::FourNumbers;
 use crate::{Candidate, Explanation};
@@ -47,7 +47,7 @@ impl Search<'_> {
     fn scan(&self, probe: usize) -> Option<Found> {
         let found = self.atlas.hunt(self.simulate, self.data, probe)?;
         let refined = self.atlas.settle(self.simulate, self.data, &found)?;
-        Some(self.found(&refined))
+        Some(self.found(&refined.refined))
     }
 
     /// The best pairs, tried to the end.
@@ -77,7 +77,8 @@ impl Search<'_> {
         self.try_all(starts.iter())
     }
 
-    /// The screened hypotheses worth a simulation: each probe in its best pattern, of one effect the best two.
+    /// The screened hypotheses worth a simulation: each probe in its best pattern, of one effect the best two. What acts at
+    /// a place was screened at a coarse grid of places with one length, and is given more room.
     fn shortlist<'s>(&self, screened: &'s [Screened]) -> Vec<&'s Screened> {
         const MOST: usize = 7;
         const OF_ONE_EFFECT: usize = 2;
@@ -88,9 +89,16 @@ impl Search<'_> {
         let spec = |s: &Screened| self.atlas.probes[probe(s)].spec;
         let mut list: Vec<&Screened> = Vec::new();
         for candidate in screened {
-            let hopeless = candidate.score < 0.7 * best.score - 20.0;
-            if list.len() == MOST || hopeless {
+            if list.len() == MOST {
                 break;
+            }
+            let share = if self.atlas.probes[probe(candidate)].free.len() > 2 {
+                0.4
+            } else {
+                0.7
+            };
+            if candidate.score < share * best.score - 20.0 {
+                continue;
             }
             let seen = list.iter().any(|s| probe(s) == probe(candidate));
             let alike = list.iter().filter(|s| spec(s) == spec(candidate)).count();
@@ -134,12 +142,30 @@ impl Search<'_> {
             let best = (alive.iter().map(|d| d.score)).fold(f64::NEG_INFINITY, f64::max);
             alive.retain(|d| d.score >= best - behind.0.max(behind.1 * best));
         }
-        let mut found: Vec<Found> = (alive.par_iter())
+        let settled = (alive.par_iter())
             .filter_map(|descent| self.atlas.settle(self.simulate, self.data, descent))
-            .map(|refined| self.found(&refined))
+            .collect();
+        let mut found: Vec<Found> = (self.closer(settled).iter())
+            .map(|settled| self.found(&settled.refined))
             .collect();
         sort(&mut found);
         found
+    }
+
+    /// Simulates hypotheses more often that explain nearly as much as the best.
+    fn closer(&self, settled: Vec<Settled>) -> Vec<Settled> {
+        const CLOSE: f64 = 9.0;
+        let best = (settled.iter().map(|s| s.refined.score)).fold(f64::NEG_INFINITY, f64::max);
+        let (close, mut others): (Vec<_>, Vec<_>) =
+            (settled.into_iter()).partition(|s| s.refined.score > best - CLOSE);
+        if close.len() < 2 {
+            others.extend(close);
+            return others;
+        }
+        let more = (close.into_par_iter())
+            .filter_map(|settled| self.atlas.settle_more(self.simulate, self.data, settled));
+        others.extend(more.collect::<Vec<_>>());
+        others
     }
 
     fn found(&self, refined: &Refined) -> Found {
@@ -152,7 +178,7 @@ impl Search<'_> {
                 let candidate = Candidate {
                     setting,
                     standard_errors: errors,
-                    gain: refined.gain,
+                    gain: refined.fit.gain,
                     fitted,
                 };
                 (refined.hypothesis.weight(part, atlas), candidate)
@@ -160,15 +186,16 @@ impl Search<'_> {
             .collect();
         effects.sort_by(|a, b| b.0.total_cmp(&a.0));
         let excess = |squares: f64| squares - self.residual.len() as f64;
-        let remainder = FourNumbers::new(&refined.residual, &atlas.layout);
+        let remainder = FourNumbers::new(&refined.fit.residual, &atlas.layout);
         Found {
-            gain_error: refined.gain_error,
+            gain_error: refined.fit.gain_error,
             hypothesis: refined.hypothesis.clone(),
             explanation: Explanation {
                 effects: effects.into_iter().map(|(_, candidate)| candidate).collect(),
                 score: refined.score,
-                gain: refined.gain,
-                share: 1.0 - excess(refined.residual.norm_squared()) / excess(self.residual.norm_squared()),
+                gain: refined.fit.gain,
+                share: 1.0
+                    - excess(refined.fit.residual.norm_squared()) / excess(self.residual.norm_squared()),
                 remainder_p: remainder.omnibus_p(),
                 remainder: Some(remainder),
             },

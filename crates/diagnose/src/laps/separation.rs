@@ -38,7 +38,7 @@ pub fn separations(
         lap: answered[0].0[0].scatter.nrows(),
     };
     let other = Scatter::of_few(declared.iter().map(|summary| &summary.0[0]))?;
-    let scatter = [Scatter::of_laps(
+    let scatter = [Scatter::near(
         answered.iter().map(|summary| &summary.0[0]),
         &other,
     )?];

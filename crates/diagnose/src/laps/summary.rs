@@ -1,5 +1,7 @@
 //! Laps as vectors, and a data set of them as the numbers that tell effects apart.
 
+use std::ops::Range;
+
 use nalgebra::{DMatrix, DVector};
 use track::Lap;
 
@@ -152,10 +154,8 @@ fn second_order(runs: &[Vec<DVector<f64>>]) -> DVector<f64> {
                 .for_each(|&d| durations.add(d));
         }
     }
-    let log_variance =
-        |from: usize, to: usize| (squares.rows(from, to - from).sum() / freedom / (to - from) as f64).ln();
-    let gate_blocks = (0..10).map(|b| log_variance(b * gates / 10, (b + 1) * gates / 10));
-    let time_blocks = (0..5).map(|b| log_variance(gates + 4 * b, gates + 4 * (b + 1)));
+    let variances = stretches(size)
+        .map(|part| (squares.rows(part.start, part.len()).sum() / freedom / part.len() as f64).ln());
     let others = [
         rough1.square().ln(),
         rough5.square().ln(),
@@ -163,7 +163,15 @@ fn second_order(runs: &[Vec<DVector<f64>>]) -> DVector<f64> {
         durations.kurtosis(),
         durations.skewness(),
     ];
-    DVector::from_iterator(SECOND, gate_blocks.chain(time_blocks).chain(others))
+    DVector::from_iterator(SECOND, variances.chain(others))
+}
+
+/// The entries of a lap's vector in 10 stretches of gates and 5 of durations.
+pub(super) fn stretches(size: usize) -> impl Iterator<Item = Range<usize>> {
+    let gates = size - BLOCKS;
+    let of_gates = (0..10).map(move |b| b * gates / 10..(b + 1) * gates / 10);
+    let of_durations = (0..5).map(move |b| gates + 4 * b..gates + 4 * (b + 1));
+    of_gates.chain(of_durations)
 }
 
 /// A run's laps in four parts of about the same length, of two laps at least.

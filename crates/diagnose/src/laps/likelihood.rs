@@ -1,0 +1,149 @@
+//! How likely data are under a simulated hypothesis.
+
+use super::atlas::{Atlas, White, white};
+use super::expectation::{Expectation, Scatter};
+use super::summary::Summary;
+
+/// How far the expectation of a simulated hypothesis may be off.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Doubt {
+    /// Variance in units of one data set's own.
+    pub(super) error: f64,
+    /// Whether all runs were taken to be alike, so that they share one error.
+    pub(super) alike: bool,
+}
+
+/// A hypothesis simulated.
+#[derive(Clone)]
+pub(super) struct Evaluated {
+    pub(super) expectation: Expectation,
+    pub(super) doubt: Doubt,
+    pub(super) summaries: Vec<Summary>,
+}
+
+/// What a simulated hypothesis leaves of the data.
+#[derive(Debug, Clone)]
+pub(super) struct Fit {
+    /// In units of the hypothesis' own scatter and of the simulation's error.
+    pub(super) residual: White,
+    /// Log-likelihood gained over the declared model.
+    pub(super) gain: f64,
+    /// Standard deviation of the gain for the simulation's own error.
+    pub(super) gain_error: f64,
+}
+
+impl Atlas {
+    /// How well a simulated hypothesis explains the data; `None` if it was simulated too seldom to know its scatter.
+    pub(super) fn fit(&self, data: &Expectation, simulated: &Evaluated) -> Option<Fit> {
+        let scatter = self.scatter_of(simulated.summaries.iter())?;
+        let residual = white(&scatter, &self.layout, data, &simulated.expectation);
+        Some(self.fit_of(data, residual, &scatter, simulated.doubt))
+    }
+
+    /// The fit that leaves a residual in units of the hypothesis' own scatter.
+    pub(super) fn fit_of(
+        &self,
+        data: &Expectation,
+        mut residual: White,
+        scatter: &[Scatter],
+        doubt: Doubt,
+    ) -> Fit {
+        let before = self.white(data, &self.null).norm_squared();
+        let (widened, doubtful) = self.allow_for(&mut residual, doubt);
+        let (mut wider, mut variance) = (widened, doubtful * doubt.error);
+        for (g, (own, declared)) in scatter.iter().zip(&self.scatter).enumerate() {
+            // Every run's mean lap and the trend are each a draw of one lap's covariance.
+            let draws = (self.layout.laps[g].len() + 1) as f64;
+            wider += draws * (own.log_det - declared.log_det);
+            // A quadratic form in an estimated covariance, and its determinant (Wishart).
+            let size = self.layout.lap as f64;
+            variance += 0.5 * draws * size * (size + draws) / own.freedom;
+        }
+        Fit {
+            gain: 0.5 * (before - residual.norm_squared() - wider),
+            gain_error: variance.sqrt(),
+            residual,
+        }
+    }
+
+    /// Brings a residual to unit variance where the expectation is in doubt. Returns the logarithm of the determinant by which
+    /// that widens the law, and the square of what lay where the doubt is.
+    fn allow_for(&self, residual: &mut White, doubt: Doubt) -> (f64, f64) {
+        let Doubt { error, alike } = doubt;
+        let (mut widened, mut doubtful) = (0.0, 0.0);
+        let mut run = 0;
+        for (g, laps) in self.layout.laps.iter().enumerate() {
+            let runs: Vec<_> = (run..run + laps.len()).map(|r| self.layout.run(r)).collect();
+            run += laps.len();
+            let mut own = vec![self.layout.trend(g), self.layout.second(g)];
+            if alike {
+                let (length, shares) = shared_error(laps);
+                let mut along = White::zeros(self.layout.lap);
+                for (range, share) in runs.iter().zip(&shares) {
+                    along.axpy(*share, &residual.rows(range.start, range.len()), 1.0);
+                }
+                let variance = 1.0 + error * length;
+                for (range, share) in runs.iter().zip(&shares) {
+                    residual.rows_mut(range.start, range.len()).axpy(
+                        share * (variance.sqrt().recip() - 1.0),
+                        &along,
+                        1.0,
+                    );
+                }
+                widened += self.layout.lap as f64 * variance.ln();
+                doubtful += length * along.norm_squared();
+            } else {
+                own.extend(runs);
+            }
+            for range in own {
+                let mut part = residual.rows_mut(range.start, range.len());
+                doubtful += part.norm_squared();
+                part /= (1.0 + error).sqrt();
+                widened += range.len() as f64 * (1.0 + error).ln();
+            }
+        }
+        (widened, doubtful)
+    }
+
+    /// The scatter of simulated data sets, recording by recording.
+    pub(super) fn scatter_of<'a>(
+        &self,
+        summaries: impl Iterator<Item = &'a Summary> + Clone,
+    ) -> Option<Vec<Scatter>> {
+        let of = |(g, declared): (usize, &Scatter)| {
+            Scatter::near(summaries.clone().map(move |summary| &summary.0[g]), declared)
+        };
+        self.scatter.iter().enumerate().map(of).collect()
+    }
+}
+
+/// An error that the runs of a recording share, the unweighted mean of theirs: its squared length where each run counts by the
+/// root of its laps, and its direction.
+fn shared_error(laps: &[usize]) -> (f64, Vec<f64>) {
+    let runs = laps.len() as f64;
+    let total: f64 = laps.iter().map(|&n| n as f64).sum();
+    let of_mean: f64 = laps.iter().map(|&n| 1.0 / n as f64).sum::<f64>() / (runs * runs);
+    let shares = laps.iter().map(|&n| (n as f64 / total).sqrt()).collect();
+    (total * of_mean, shares)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn runs_of_equal_length_share_the_whole_error() {
+        let (length, shares) = shared_error(&[20; 4]);
+        assert!((length - 1.0).abs() < 1e-12);
+        assert!(shares.iter().all(|share| (share - 0.5).abs() < 1e-12));
+    }
+
+    #[test]
+    fn the_direction_of_a_shared_error_has_length_one() {
+        let (length, shares) = shared_error(&[3, 5, 20]);
+        let square: f64 = shares.iter().map(|s| s * s).sum();
+        assert!((square - 1.0).abs() < 1e-12);
+        // Variance 1/9 (1/3 + 1/5 + 1/20) of the mean of the means, times 28 laps.
+        assert!((length - 28.0 / 9.0 * (1.0 / 3.0 + 0.2 + 0.05)).abs() < 1e-12);
+    }
+}
