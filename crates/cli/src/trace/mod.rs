@@ -113,8 +113,10 @@ impl Trace {
         let baselines = logged.is_none().then(|| atlas.baselines(&laps)).transpose()?;
         let progress = session.progress("naming the effect", 1);
         let (residual, answer, from_logs) = match logged {
-            Some((recording, rows)) => {
-                let found = from_logs(&recording.setup, &rows, &atlas, &simulate, &laps);
+            Some((place, rows)) => {
+                let first: usize = recordings[..place].iter().map(|r| r.measured.runs.len()).sum();
+                let own = first..first + rows.len();
+                let found = from_logs(&recordings[place].setup, &rows, own, &atlas, &simulate, &laps);
                 interrupt::check()?;
                 let found = found?;
                 (found.before, found.answer(), Some(found))
@@ -194,11 +196,10 @@ fn remarks(recordings: &[Recording]) -> Vec<String> {
     remarks
 }
 
-/// The first recording with logs.
-fn with_logs(recordings: &[Recording]) -> Option<(&Recording, Vec<Vec<diagnose::LogRow>>)> {
-    recordings
-        .iter()
-        .find_map(|recording| log_rows(&recording.measured.set).map(|rows| (recording, rows)))
+/// The first recording with logs, and they.
+fn with_logs(recordings: &[Recording]) -> Option<(usize, Vec<Vec<diagnose::LogRow>>)> {
+    (recordings.iter().enumerate())
+        .find_map(|(place, recording)| log_rows(&recording.measured.set).map(|rows| (place, rows)))
 }
 
 /// The errors of every recording; without unseen data each run is left out of the fit in turn.
