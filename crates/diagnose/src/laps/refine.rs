@@ -15,18 +15,35 @@ use super::screen::price;
 use super::summary::Summary;
 use crate::Error;
 
-/// Data sets simulated at each point of the first round, and of the later ones: with few numbers to fit, and with many,
-/// which have more points.
-const ROUND_SETS: [[u64; 2]; 2] = [[4, 3], [10, 6]];
+/// What is simulated in a round of a descent.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Round {
+    /// The hypothesis and a step to either side in each of its numbers, with a few data sets.
+    Rough,
+    /// The hypothesis alone; what its numbers do is taken from the rough round.
+    Again,
+    /// The hypothesis and both sides, with as many data sets as sizes and their errors need.
+    Full,
+}
+
+impl Round {
+    /// Data sets at each point: with few numbers to fit, and with many, which have more points.
+    fn sets(self) -> [u64; 2] {
+        match self {
+            Self::Rough => [4, 3],
+            Self::Again | Self::Full => [10, 6],
+        }
+    }
+}
 
 /// Numbers to fit from which there are many.
 const MANY: usize = 5;
 
-/// Data sets simulated at the end.
-const FINAL_SETS: u64 = 32;
-
-/// Data sets simulated of hypotheses that explain nearly as much as the best.
-const CLOSE_SETS: u64 = 96;
+/// Data sets simulated of every hypothesis that comes to the end, of the best, and of it and others that explain nearly as
+/// much.
+const END_SETS: u64 = 16;
+pub(super) const FINAL_SETS: u64 = 32;
+pub(super) const CLOSE_SETS: u64 = 64;
 
 /// A hypothesis at its most likely sizes.
 #[derive(Debug, Clone)]
@@ -60,10 +77,10 @@ pub(super) struct Descent {
     errors: Vec<f64>,
     /// Log-likelihood gained over the declared model less the price of the fitted numbers, as the last round saw it.
     pub(super) score: f64,
-    /// Whether the last round moved nothing by more than half its error.
-    settled: bool,
-    /// Whether no round was made yet.
-    first: bool,
+    /// What the rough round saw, and the moves since.
+    near: Option<(Local, DVector<f64>)>,
+    /// Whether there is nothing to descend to.
+    found: bool,
 }
 
 impl Descent {
@@ -75,8 +92,8 @@ impl Descent {
             errors: vec![f64::INFINITY; freedoms.len()],
             freedoms,
             score: f64::NEG_INFINITY,
-            settled: false,
-            first: true,
+            near: None,
+            found: false,
         }
     }
 
@@ -98,27 +115,35 @@ impl Atlas {
         &self,
         simulate: &Simulate<'_>,
         data: &Expectation,
-        mut descent: Descent,
+        descent: Descent,
+        round: Round,
     ) -> Option<Descent> {
-        if descent.settled {
-            return Some(descent);
+        match (round, &descent.near) {
+            _ if descent.found => Some(descent),
+            (Round::Again, Some(_)) => self.look_again(simulate, data, descent),
+            _ => self.look_around(simulate, data, descent, round),
         }
+    }
+
+    fn look_around(
+        &self,
+        simulate: &Simulate<'_>,
+        data: &Expectation,
+        descent: Descent,
+        round: Round,
+    ) -> Option<Descent> {
         let Descent {
             hypothesis,
-            freedoms,
-            errors,
-            first,
+            mut freedoms,
+            mut errors,
             ..
-        } = &mut descent;
-        let local = self.local(simulate, hypothesis, freedoms, ROUND_SETS[usize::from(!*first)])?;
+        } = descent;
+        let local = self.local(simulate, &hypothesis, &freedoms, round)?;
         let target = white(&local.scatter, &self.layout, data, &local.center);
-        let (moves, covariance) = nearest(&local.columns, &target, freedoms);
+        let (moves, covariance) = nearest(&local.columns, &target, &freedoms);
         let left = left_of(&local.columns, &target, &moves);
         let fit = self.fit_of(data, left, &local.scatter, local.doubt);
-        let score = hypothesis.worth(fit.gain) - self.price_of(hypothesis);
-        let settled = (0..moves.len()).all(|i| moves[i].abs() < 0.5 * covariance[(i, i)].sqrt());
-        let by: Vec<(Freedom, f64)> = freedoms.iter().copied().zip(moves.iter().copied()).collect();
-        *hypothesis = hypothesis.moved(self, &by);
+        let hypothesis = self.with_moves(&hypothesis, &freedoms, &moves);
         for (i, freedom) in freedoms.iter_mut().enumerate() {
             errors[i] = (covariance[(i, i)] * (1.0 + local.doubt.error)).sqrt();
             // The parabola should hold where the answer may lie, and be wide enough for the noise of its points not to
@@ -127,11 +152,42 @@ impl Atlas {
             freedom.step = reach.clamp(0.2 * freedom.step, freedom.step);
         }
         Some(Descent {
-            score,
-            settled,
-            first: false,
+            score: hypothesis.worth(fit.gain) - self.price_of(&hypothesis),
+            near: Some((local, moves)),
+            found: false,
+            hypothesis,
+            freedoms,
+            errors,
+        })
+    }
+
+    fn look_again(&self, simulate: &Simulate<'_>, data: &Expectation, descent: Descent) -> Option<Descent> {
+        let (local, moved) = descent.near.as_ref()?;
+        let sets = self.sets_at(&descent.freedoms, Round::Again, 1);
+        let center = self.evaluate(simulate, &descent.hypothesis, sets)?;
+        let columns: Vec<Column> = (local.columns.iter().zip(moved.iter()))
+            .map(|(column, moved)| column.from(*moved))
+            .collect();
+        let target = white(&local.scatter, &self.layout, data, &center.expectation);
+        let (moves, _) = nearest(&columns, &target, &descent.freedoms);
+        let hoped = target.norm_squared() - left_of(&columns, &target, &moves).norm_squared();
+        let gain = self.fit(data, &center)?.gain + 0.5 * hoped;
+        let hypothesis = self.with_moves(&descent.hypothesis, &descent.freedoms, &moves);
+        Some(Descent {
+            score: hypothesis.worth(gain) - self.price_of(&hypothesis),
+            hypothesis,
             ..descent
         })
+    }
+
+    fn with_moves(&self, hypothesis: &Hypothesis, freedoms: &[Freedom], moves: &DVector<f64>) -> Hypothesis {
+        let by: Vec<(Freedom, f64)> = freedoms.iter().copied().zip(moves.iter().copied()).collect();
+        hypothesis.moved(self, &by)
+    }
+
+    /// Data sets at each of so many points of a round.
+    fn sets_at(&self, freedoms: &[Freedom], round: Round, points: u64) -> u64 {
+        self.enough(round.sets()[usize::from(freedoms.len() >= MANY)], points)
     }
 
     /// For each run the effects with sizes fitted to the other runs alone, by the parabolas about the hypothesis' sizes; a
@@ -143,7 +199,7 @@ impl Atlas {
         hypothesis: &Hypothesis,
     ) -> Result<Vec<Vec<Setting>>, Error> {
         let freedoms = hypothesis.freedoms(self);
-        let local = self.local(simulate, hypothesis, &freedoms, ROUND_SETS[1]);
+        let local = self.local(simulate, hypothesis, &freedoms, Round::Full);
         let fit_without = |run: usize| {
             let found = match &local {
                 Some(local) => self.fit_without(run, local, runs, hypothesis, &freedoms)?,
@@ -187,8 +243,7 @@ impl Atlas {
             }
         }
         let (moves, _) = nearest(&columns, &target, freedoms);
-        let moves: Vec<(Freedom, f64)> = freedoms.iter().copied().zip(moves.iter().copied()).collect();
-        Ok(self.quantised(hypothesis.moved(self, &moves)))
+        Ok(self.quantised(self.with_moves(hypothesis, freedoms, &moves)))
     }
 
     /// A hypothesis at its most likely sizes, simulated often enough to judge it.
@@ -199,19 +254,20 @@ impl Atlas {
         found: &Descent,
     ) -> Option<Settled> {
         let hypothesis = self.quantised(found.hypothesis.clone());
-        let end = self.evaluate(simulate, &hypothesis, self.enough(FINAL_SETS, 1))?;
+        let end = self.evaluate(simulate, &hypothesis, self.enough(END_SETS, 1))?;
         self.settled(data, hypothesis, found.errors(), end)
     }
 
-    /// The same hypothesis simulated more often, to tell it from others that explain as much.
+    /// The same hypothesis simulated more often.
     pub(super) fn settle_more(
         &self,
         simulate: &Simulate<'_>,
         data: &Expectation,
         settled: Settled,
+        sets: u64,
     ) -> Option<Settled> {
         let Settled { refined, evaluated } = settled;
-        let more = self.evaluate_more(simulate, &refined.hypothesis, evaluated, CLOSE_SETS)?;
+        let more = self.evaluate_more(simulate, &refined.hypothesis, evaluated, sets)?;
         self.settled(data, refined.hypothesis, refined.errors, more)
     }
 
@@ -235,7 +291,7 @@ impl Atlas {
 
     /// Data sets at each of so many points that determine the scatter of a lap too: short runs need more of them.
     fn enough(&self, sets: u64, points: u64) -> u64 {
-        const TIMES: usize = 3;
+        const TIMES: usize = 2;
         let freedom: usize = (self.layout.laps.iter())
             .map(|laps| laps.iter().map(|n| n - 2).sum())
             .min()
@@ -310,7 +366,7 @@ impl Atlas {
     /// where no size explains a fair share.
     pub(super) fn hunt(&self, simulate: &Simulate<'_>, data: &Expectation, probe: usize) -> Option<Descent> {
         const COARSE: usize = 60;
-        const COARSE_SETS: u64 = 2;
+        const COARSE_SETS: u64 = 1;
         const CLOSER: [u64; 3] = [4, 8, 12];
         const FAIR_SHARE: f64 = 0.25;
         let p = &self.probes[probe];
@@ -343,7 +399,7 @@ impl Atlas {
         let start = Descent::start(self, &hypothesis);
         Some(Descent {
             errors: vec![error; start.freedoms.len()],
-            settled: true,
+            found: true,
             ..start
         })
     }
@@ -445,16 +501,15 @@ impl Atlas {
         }
     }
 
-    /// A hypothesis and its neighbourhood, each point simulated with so many data sets where there are few numbers to fit,
-    /// and where there are many.
+    /// A hypothesis and its neighbourhood.
     fn local(
         &self,
         simulate: &Simulate<'_>,
         hypothesis: &Hypothesis,
         freedoms: &[Freedom],
-        sets: [u64; 2],
+        round: Round,
     ) -> Option<Local> {
-        let sets = self.enough(sets[usize::from(freedoms.len() >= MANY)], 3);
+        let sets = self.sets_at(freedoms, round, 3);
         let center = self.evaluate(simulate, hypothesis, sets)?;
         let mut sides = Vec::with_capacity(freedoms.len());
         for group in groups(freedoms) {
@@ -536,6 +591,7 @@ fn of_run(action: &White, run: usize, layout: &Layout) -> White {
 }
 
 /// A hypothesis and its neighbourhood.
+#[derive(Debug, Clone)]
 struct Local {
     center: Expectation,
     doubt: Doubt,
@@ -544,13 +600,21 @@ struct Local {
 }
 
 /// The action of one number: slope and curvature.
-#[derive(Clone)]
+#[derive(Debug, Clone)]
 struct Column {
     slope: White,
     curvature: White,
 }
 
 impl Column {
+    /// The same parabola as seen from another point of it.
+    fn from(&self, moved: f64) -> Self {
+        Self {
+            slope: &self.slope + &self.curvature * (2.0 * moved),
+            curvature: self.curvature.clone(),
+        }
+    }
+
     /// The parabola through the origin and two points.
     fn through(down: (f64, White), up: (f64, White)) -> Self {
         let (a, b) = (down.0, up.0);

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::atlas::{Atlas, Simulate, White};
 use super::expectation::Expectation;
 use super::hypothesis::{Hypothesis, Part};
-use super::refine::{Descent, Refined, Settled};
+use super::refine::{CLOSE_SETS, Descent, FINAL_SETS, Refined, Round, Settled};
 use super::screen::Screened;
 use super::tests_of_fit::FourNumbers;
 use crate::{Candidate, Explanation};
@@ -30,7 +30,14 @@ pub(super) struct Search<'a> {
 
 /// Rounds of a descent, each with the log-likelihood, and the share of the best one's, by which what lies behind then does
 /// not come back.
-const BEHIND: [(f64, f64); 3] = [(50.0, 0.2), (30.0, 0.05), (20.0, 0.015)];
+const ROUNDS: [(Round, f64, f64); 3] = [
+    (Round::Rough, 50.0, 0.2),
+    (Round::Again, 30.0, 0.05),
+    (Round::Full, 20.0, 0.015),
+];
+
+/// The same for hypotheses of many numbers that are linear in what they do.
+const ROUNDS_OF_GROUPS: [(Round, f64, f64); 2] = [(Round::Rough, 30.0, 0.05), (Round::Full, 20.0, 0.015)];
 
 impl Search<'_> {
     /// The best single effects, tried to the end, best first.
@@ -118,29 +125,29 @@ impl Search<'_> {
     /// Causes without a name: the groups of basis functions that explain most with fewest coefficients, tried to the end.
     pub(super) fn unnamed(&self) -> Vec<Found> {
         let starts = self.atlas.screen_groups(self.simulate, self.residual);
-        self.try_rounds(starts.iter(), &BEHIND[1..])
+        self.try_rounds(starts.iter(), &ROUNDS_OF_GROUPS)
     }
 
     /// Descends from every hypothesis round by round, dropping those that fall behind, then settles those that may still be
     /// the best.
     fn try_all<'h>(&self, hypotheses: impl Iterator<Item = &'h Hypothesis>) -> Vec<Found> {
-        self.try_rounds(hypotheses, &BEHIND)
+        self.try_rounds(hypotheses, &ROUNDS)
     }
 
     fn try_rounds<'h>(
         &self,
         hypotheses: impl Iterator<Item = &'h Hypothesis>,
-        rounds: &[(f64, f64)],
+        rounds: &[(Round, f64, f64)],
     ) -> Vec<Found> {
         let mut alive: Vec<Descent> = hypotheses
             .map(|start| Descent::start(self.atlas, start))
             .collect();
-        for behind in rounds {
+        for &(round, behind, share) in rounds {
             alive = (alive.into_par_iter())
-                .filter_map(|descent| self.atlas.descend(self.simulate, self.data, descent))
+                .filter_map(|descent| self.atlas.descend(self.simulate, self.data, descent, round))
                 .collect();
             let best = (alive.iter().map(|d| d.score)).fold(f64::NEG_INFINITY, f64::max);
-            alive.retain(|d| d.score >= best - behind.0.max(behind.1 * best));
+            alive.retain(|d| d.score >= best - behind.max(share * best));
         }
         let settled = (alive.par_iter())
             .filter_map(|descent| self.atlas.settle(self.simulate, self.data, descent))
@@ -152,18 +159,15 @@ impl Search<'_> {
         found
     }
 
-    /// Simulates hypotheses more often that explain nearly as much as the best.
+    /// Simulates the best hypothesis more often, and still more if others explain nearly as much.
     fn closer(&self, settled: Vec<Settled>) -> Vec<Settled> {
-        const CLOSE: f64 = 9.0;
+        const CLOSE: f64 = 10.0;
         let best = (settled.iter().map(|s| s.refined.score)).fold(f64::NEG_INFINITY, f64::max);
         let (close, mut others): (Vec<_>, Vec<_>) =
             (settled.into_iter()).partition(|s| s.refined.score > best - CLOSE);
-        if close.len() < 2 {
-            others.extend(close);
-            return others;
-        }
+        let sets = if close.len() > 1 { CLOSE_SETS } else { FINAL_SETS };
         let more = (close.into_par_iter())
-            .filter_map(|settled| self.atlas.settle_more(self.simulate, self.data, settled));
+            .filter_map(|settled| self.atlas.settle_more(self.simulate, self.data, settled, sets));
         others.extend(more.collect::<Vec<_>>());
         others
     }
