@@ -98,6 +98,11 @@ pub(crate) fn figures(outcomes: &[Outcome]) -> Vec<Figure> {
             spread(&ratios(&of.all(listed))),
         ),
         figure(
+            "error before / floor on effect-free sets: what chance makes of such a ratio",
+            "",
+            spread(&ratios(&of.all(|o| o.label.kind == Kind::Null))),
+        ),
+        figure(
             "places (azimuth rad, position, length m): median difference, 90 % quantile; intervals that hold the truth",
             "",
             apart(&places),

@@ -8,7 +8,7 @@ use crate::laps::SampledRun;
 use crate::setup::Setup;
 
 /// Runs behind every mean lap, each of at least 20 laps.
-const RUNS: u64 = 64;
+const RUNS: u64 = 32;
 /// Runs that share a seed.
 const RUNS_PER_SEED: u64 = 4;
 /// Seeds of the laps that errors are measured with lie far from those of the fit.
@@ -26,7 +26,7 @@ pub(crate) struct MeanLaps {
 }
 
 impl MeanLaps {
-    /// Simulates a model with effects: 64 runs of `laps` laps. By run, the runs take the effects' values in turn.
+    /// Simulates a model with effects: 32 runs of `laps` laps. By run, the runs take the effects' values in turn.
     pub(crate) fn new(setup: &Setup, effects: &[Setting], seed: u64, laps: usize) -> Result<Self> {
         let mut model = setup.model.clone();
         model.effects.extend_from_slice(effects);

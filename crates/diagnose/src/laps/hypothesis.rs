@@ -192,6 +192,11 @@ impl Hypothesis {
             .collect()
     }
 
+    /// Whether an effect acts at a place of a wall, which is fitted too.
+    pub(super) fn has_place(&self, atlas: &Atlas) -> bool {
+        self.parts.iter().any(|part| atlas.probes[part.probe].has_place())
+    }
+
     /// Whether all runs are alike.
     pub(super) fn alike(&self) -> bool {
         self.parts.iter().all(|part| part.shape != Shape::ByRun)

@@ -72,6 +72,11 @@ impl Probe {
         self.free[0].0
     }
 
+    /// Whether it acts at a place of a wall; place and length are fitted with the size.
+    pub(super) fn has_place(&self) -> bool {
+        self.spec.params.iter().any(|param| param.name == "position")
+    }
+
     /// The values where nothing is done.
     pub(super) fn origin(&self) -> &[f64] {
         &self.origin

@@ -79,7 +79,7 @@ pub(super) struct Descent {
     pub(super) score: f64,
     /// What the rough round saw, and the moves since.
     near: Option<(Local, DVector<f64>)>,
-    /// Whether there is nothing to descend to.
+    /// Whether there is nowhere left to descend to.
     found: bool,
 }
 
@@ -120,6 +120,10 @@ impl Atlas {
     ) -> Option<Descent> {
         match (round, &descent.near) {
             _ if descent.found => Some(descent),
+            // A place is not found on one parabola.
+            (Round::Again, _) if descent.hypothesis.has_place(self) => {
+                self.look_around(simulate, data, descent, Round::Rough)
+            }
             (Round::Again, Some(_)) => self.look_again(simulate, data, descent),
             _ => self.look_around(simulate, data, descent, round),
         }
@@ -132,6 +136,8 @@ impl Atlas {
         descent: Descent,
         round: Round,
     ) -> Option<Descent> {
+        /// Errors by which a number may still have moved in the last round.
+        const SETTLED: f64 = 0.7;
         let Descent {
             hypothesis,
             mut freedoms,
@@ -144,6 +150,7 @@ impl Atlas {
         let left = left_of(&local.columns, &target, &moves);
         let fit = self.fit_of(data, left, &local.scatter, local.doubt);
         let hypothesis = self.with_moves(&hypothesis, &freedoms, &moves);
+        let settled = (0..moves.len()).all(|i| moves[i].abs() < SETTLED * covariance[(i, i)].sqrt());
         for (i, freedom) in freedoms.iter_mut().enumerate() {
             errors[i] = (covariance[(i, i)] * (1.0 + local.doubt.error)).sqrt();
             // The parabola should hold where the answer may lie, and be wide enough for the noise of its points not to
@@ -153,8 +160,8 @@ impl Atlas {
         }
         Some(Descent {
             score: hypothesis.worth(fit.gain) - self.price_of(&hypothesis),
+            found: round == Round::Full && settled,
             near: Some((local, moves)),
-            found: false,
             hypothesis,
             freedoms,
             errors,

@@ -30,10 +30,12 @@ pub(super) struct Search<'a> {
 
 /// Rounds of a descent, each with the log-likelihood, and the share of the best one's, by which what lies behind then does
 /// not come back.
-const ROUNDS: [(Round, f64, f64); 3] = [
+const ROUNDS: [(Round, f64, f64); 5] = [
     (Round::Rough, 50.0, 0.2),
-    (Round::Again, 30.0, 0.05),
-    (Round::Full, 20.0, 0.015),
+    (Round::Again, 30.0, 0.03),
+    (Round::Full, 20.0, 0.004),
+    (Round::Full, 15.0, 0.004),
+    (Round::Full, 15.0, 0.004),
 ];
 
 /// The same for hypotheses of many numbers that are linear in what they do.
@@ -99,7 +101,7 @@ impl Search<'_> {
             if list.len() == MOST {
                 break;
             }
-            let share = if self.atlas.probes[probe(candidate)].free.len() > 2 {
+            let share = if self.atlas.probes[probe(candidate)].has_place() {
                 0.4
             } else {
                 0.7

@@ -9,7 +9,9 @@ use super::moments::cut;
 /// another one that differs in one stage, to first order: the other model is asked at the poses of the trace.
 pub(crate) fn column(forecast: &mut Forecast<'_>, stage: Stage, trace: &Trace) -> Vec<f32> {
     let mut change = vec![0.0; trace.instants.len() * MEASURED];
-    let mut dx = [0.0; 3];
+    /// Difference of a pose, m and rad, that shows in nothing.
+    const NOTHING: f64 = 1e-9;
+    let mut dx = [0.0_f64; 3];
     for (instant, change) in trace.instants.iter().zip(change.chunks_exact_mut(MEASURED)) {
         forecast.tick(instant.time_s);
         let mut shift = [0.0; MEASURED];
@@ -24,22 +26,26 @@ pub(crate) fn column(forecast: &mut Forecast<'_>, stage: Stage, trace: &Trace) -
                     cut(read[lane], instant.deviation[lane], trace.step_counts).mean - instant.expected[lane];
             }
         }
-        for m in 0..MEASURED {
-            let slope = &instant.slope[m];
-            let missed = -(shift[m] + slope[0] * dx[0] + slope[1] * dx[1] + slope[2] * dx[2]);
-            let gain = &instant.gain[m];
-            for axis in 0..3 {
-                dx[axis] += gain[axis] * missed;
+        if shift == [0.0; MEASURED] && dx.iter().all(|d| d.abs() < NOTHING) {
+            dx = [0.0; 3];
+        } else {
+            for m in 0..MEASURED {
+                let slope = &instant.slope[m];
+                let missed = -(shift[m] + slope[0] * dx[0] + slope[1] * dx[1] + slope[2] * dx[2]);
+                let gain = &instant.gain[m];
+                for axis in 0..3 {
+                    dx[axis] += gain[axis] * missed;
+                }
+                if instant.used >> m & 1 == 1 {
+                    change[m] = (missed * instant.per_scale[m]) as f32;
+                }
             }
-            if instant.used >> m & 1 == 1 {
-                change[m] = (missed * instant.per_scale[m]) as f32;
-            }
+            dx = [
+                dx[0] - instant.turned.y * dx[2],
+                dx[1] + instant.turned.x * dx[2],
+                dx[2],
+            ];
         }
-        dx = [
-            dx[0] - instant.turned.y * dx[2],
-            dx[1] + instant.turned.x * dx[2],
-            dx[2],
-        ];
         if stage == Stage::Act {
             let moved = difference(
                 forecast.lead(instant.moved_from, instant.command),

@@ -21,6 +21,8 @@ fn factor(evidence: &Evidence<'_>, settings: &[Setting], base: f64, spec: &'stat
         settings.push(Setting::constant(spec, [log.exp()]));
         evidence.assess(&settings, &[]).map(|found| found.total())
     };
+    /// Log-likelihood gained below which the exact factor does not matter.
+    const NOTHING: f64 = 3.0;
     let (mut middle, mut top, mut half) = (0.0, base, 0.15);
     let mut bend = -1.0;
     for _ in 0..12 {
@@ -42,6 +44,9 @@ fn factor(evidence: &Evidence<'_>, settings: &[Setting], base: f64, spec: &'stat
         let moved = (best.0 - middle).abs();
         if best.1 > top {
             (middle, top) = best;
+        }
+        if bend < 0.0 && top - base < NOTHING && middle.abs() < half {
+            break;
         }
         if bend < 0.0 && half < 0.03 && (moved < 0.2 * half || step.abs() < 0.2 * half) {
             break;
