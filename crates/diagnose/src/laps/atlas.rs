@@ -22,7 +22,7 @@ pub type Simulate<'a> = dyn Fn(&[Setting], u64) -> Option<Vec<Vec<track::Lap>>> 
 pub(super) const NULL_SETS: u64 = 200;
 
 /// Data sets simulated for each other way to cut the walls.
-const CUT_SETS: u64 = 16;
+const CUT_SETS: u64 = 8;
 
 /// One data set in units of the declared model's scatter, less its expectation: for each run the mean lap times the root of the number of
 /// laps, then the trend times the root of the number of runs, then the second-order numbers; see [`Layout`]. Under the

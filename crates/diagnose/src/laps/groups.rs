@@ -12,7 +12,7 @@ use super::screen::price;
 const WORDS: usize = 3;
 
 /// Data sets simulated for each coefficient.
-const GROUP_SETS: u64 = 4;
+const GROUP_SETS: u64 = 2;
 
 /// Groups within this share of the best explained are as good; of those the one with fewest coefficients is best.
 const AS_GOOD: f64 = 0.97;

@@ -29,10 +29,10 @@ pub(super) struct Probe {
 }
 
 /// Data sets simulated beforehand for each size of a probe.
-pub(super) const PROBE_SETS: u64 = 6;
+pub(super) const PROBE_SETS: u64 = 4;
 
 /// The same where there are many places of one effect.
-const PLACE_SETS: u64 = 5;
+const PLACE_SETS: u64 = 4;
 
 impl Probe {
     /// Numbers to fit without a path: a group of basis functions.

@@ -38,13 +38,20 @@ const ROUNDS: [(Round, f64, f64); 5] = [
     (Round::Full, 15.0, 0.004),
 ];
 
+/// The same for several effects together.
+const ROUNDS_OF_SEVERAL: [(Round, f64, f64); 3] = [
+    (Round::Rough, 50.0, 0.1),
+    (Round::Again, 30.0, 0.03),
+    (Round::Full, 15.0, 0.01),
+];
+
 /// The same for hypotheses of many numbers that are linear in what they do.
 const ROUNDS_OF_GROUPS: [(Round, f64, f64); 2] = [(Round::Rough, 30.0, 0.05), (Round::Full, 20.0, 0.015)];
 
 impl Search<'_> {
     /// The best single effects, tried to the end, best first.
     pub(super) fn singles(&self, screened: &[Screened]) -> Vec<Found> {
-        self.try_all(self.shortlist(screened).iter().map(|s| &s.hypothesis))
+        self.try_rounds(self.shortlist(screened).iter().map(|s| &s.hypothesis), &ROUNDS)
     }
 
     /// Effects whose action jumps with their size, at the best of many sizes: derivatives say nothing of them.
@@ -63,7 +70,7 @@ impl Search<'_> {
     pub(super) fn pairs(&self) -> Vec<Found> {
         const PAIRS: usize = 8;
         let pairs = self.atlas.screen_pairs(self.residual, PAIRS);
-        self.try_all(pairs.iter().map(|pair| &pair.hypothesis))
+        self.try_rounds(pairs.iter().map(|pair| &pair.hypothesis), &ROUNDS_OF_SEVERAL)
     }
 
     /// The best explanations with what explains their remainder best beside them, tried to the end.
@@ -83,7 +90,7 @@ impl Search<'_> {
                 .collect::<Vec<_>>()
         });
         let starts: Vec<Hypothesis> = starts.collect();
-        self.try_all(starts.iter())
+        self.try_rounds(starts.iter(), &ROUNDS_OF_SEVERAL)
     }
 
     /// The screened hypotheses worth a simulation: each probe in its best pattern, of one effect the best two. What acts at
@@ -132,10 +139,6 @@ impl Search<'_> {
 
     /// Descends from every hypothesis round by round, dropping those that fall behind, then settles those that may still be
     /// the best.
-    fn try_all<'h>(&self, hypotheses: impl Iterator<Item = &'h Hypothesis>) -> Vec<Found> {
-        self.try_rounds(hypotheses, &ROUNDS)
-    }
-
     fn try_rounds<'h>(
         &self,
         hypotheses: impl Iterator<Item = &'h Hypothesis>,
