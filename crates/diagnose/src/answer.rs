@@ -142,4 +142,98 @@ impl Answer {
     pub fn settings(&self) -> Vec<Setting> {
         self.claimed().map(Explanation::settings).unwrap_or_default()
     }
+
+    /// This answer, unless it is a slower wheel and more slip whose sizes follow from one another, as they do if wheels
+    /// stand still in a share of the physics steps: one cause without a name, then, rather than two with theirs.
+    /// `slip_level` is the declared model's.
+    #[must_use]
+    pub fn unless_stalls(mut self, slip_level: f64) -> Self {
+        if self
+            .claimed()
+            .is_some_and(|claimed| are_stalls(claimed, slip_level))
+        {
+            self.verdict = Verdict::Unexplained;
+            self.cause = Some(Cause {
+                stage: Stage::Act,
+                acts_on: "wheel speed".into(),
+                depends_on: "chance".into(),
+            });
+            self.left_out.iter_mut().for_each(Vec::clear);
+        }
+        self
+    }
+}
+
+/// Whether a slower wheel and more slip are what standing still in a share of the physics steps does to the mean and the
+/// variance of the speed.
+fn are_stalls(explanation: &Explanation, slip_level: f64) -> bool {
+    /// Share, or else standard errors, by which the slip may be off.
+    const OFF: (f64, f64) = (0.05, 3.0);
+    let size = |name: &str| {
+        let effect = explanation.effects.iter().find(|e| e.setting.spec.name == name)?;
+        let Pattern::Constant(values) = &effect.setting.pattern else {
+            return None;
+        };
+        Some((values[0], effect.standard_errors[0]))
+    };
+    let (Some((speed, _)), Some((slip, error)), 2) =
+        (size("wheel-scale"), size("slip-level"), explanation.effects.len())
+    else {
+        return false;
+    };
+    // Slip is uniform in +-s: variance s^2 / 3 of the speed's share.
+    let (stalls, declared) = (1.0 - speed, slip_level * slip_level / 3.0);
+    if stalls <= 0.0 || declared == 0.0 {
+        return false;
+    }
+    let variance = stalls * speed + speed * declared;
+    let expected = (variance / declared).sqrt() / speed;
+    (slip - expected).abs() < (OFF.0 * expected).max(OFF.1 * error)
+}
+
+#[cfg(test)]
+mod tests {
+    use sim::find;
+
+    use super::*;
+
+    fn answer(speed: f64, slip: f64) -> Answer {
+        let effect = |name: &str, value: f64| Candidate {
+            setting: Setting::constant(find(name).unwrap(), [value]),
+            standard_errors: vec![0.01],
+            gain: 100.0,
+            fitted: 1,
+        };
+        let explanation = Explanation {
+            effects: vec![effect("wheel-scale", speed), effect("slip-level", slip)],
+            score: 90.0,
+            gain: 100.0,
+            share: 1.0,
+            remainder_p: 0.5,
+            remainder: None,
+        };
+        Answer {
+            verdict: Verdict::Explained,
+            explanations: vec![explanation],
+            indistinguishable: 1,
+            left_out: Vec::new(),
+            cause: None,
+        }
+    }
+
+    #[test]
+    fn wheels_that_stand_still_now_and_then_have_no_name() {
+        // Standing still in one step of ten: mean 0.9, variance 0.09 + 0.9 * 0.01 / 3 of a slip of 0.1.
+        let slip = ((0.09_f64 + 0.003) / (0.01 / 3.0)).sqrt() / 0.9;
+        let doubted = answer(0.9, slip).unless_stalls(0.1);
+        assert_eq!(doubted.verdict, Verdict::Unexplained);
+        assert_eq!(doubted.cause.unwrap().depends_on, "chance");
+    }
+
+    #[test]
+    fn other_sizes_of_the_same_two_effects_keep_their_names() {
+        for (speed, slip) in [(0.9, 3.0), (1.1, 5.0), (0.99, 5.0)] {
+            assert_eq!(answer(speed, slip).unless_stalls(0.1).verdict, Verdict::Explained);
+        }
+    }
 }

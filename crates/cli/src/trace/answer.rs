@@ -14,9 +14,6 @@ use crate::setup::Setup;
 
 /// Probability below which laps contradict what the logs say, if the answer does not explain most of it.
 const CONTRADICTS_P: f64 = 1e-5;
-/// Share of their expectation that the squares of the runs' differences must reach: an answer from logs whose robot scatters far
-/// more than the laps do is none.
-const LEAST_SCATTER: f64 = 0.8;
 /// Share of the laps' departure that an answer from logs must explain to stand.
 const CONFIRMED_SHARE: f64 = 0.8;
 
@@ -64,11 +61,7 @@ pub(crate) fn from_logs(
     spread(&mut logs.answer, &logged, laps.len());
     let (before, after) = atlas.confirm(simulate, laps, &logs.answer.settings())?;
     let confirmed = after.is_some_and(|after| {
-        let quiet =
-            after.quiet_p() < CONTRADICTS_P && after.runs.q < LEAST_SCATTER * after.runs.freedom as f64;
-        let explained =
-            after.omnibus_p() >= CONTRADICTS_P || after.excess() < (1.0 - CONFIRMED_SHARE) * before.excess();
-        explained && !quiet
+        after.omnibus_p() >= CONTRADICTS_P || after.excess() < (1.0 - CONFIRMED_SHARE) * before.excess()
     });
     Ok(FromLogs {
         logs,

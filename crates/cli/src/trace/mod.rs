@@ -111,6 +111,8 @@ impl Trace {
             .collect::<Result<Vec<_>>>()?;
         let atlas = Atlas::join(parts).expect("at least one data set is measured");
         let baselines = logged.is_none().then(|| atlas.baselines(&laps)).transpose()?;
+        let slip_level = recordings[0].config.slip.level;
+        let doubted = |answer: Answer| answer.unless_stalls(slip_level);
         let progress = session.progress("naming the effect", 1);
         let (residual, answer, from_logs) = match logged {
             Some((place, rows)) => {
@@ -119,13 +121,13 @@ impl Trace {
                 let found = from_logs(&recordings[place].setup, &rows, own, &atlas, &simulate, &laps);
                 interrupt::check()?;
                 let found = found?;
-                (found.before, found.answer(), Some(found))
+                (found.before, doubted(found.answer()), Some(found))
             }
             None => {
                 let found = atlas.diagnose(&simulate, &laps);
                 interrupt::check()?;
                 let found = found?;
-                (found.residual, found.answer, None)
+                (found.residual, doubted(found.answer), None)
             }
         };
         progress.tick(1);

@@ -1,10 +1,10 @@
 //! What a model leads one to expect of a data set, by simulation.
 
-use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn, SymmetricEigen};
 use serde::{Deserialize, Serialize};
 use statrs::function::gamma::digamma;
 
-use super::summary::{Recording, SECOND, Summary, stretches};
+use super::summary::{Recording, SECOND, Summary};
 
 /// Means of the summaries of simulated data sets, recording by recording.
 ///
@@ -118,6 +118,8 @@ pub(super) struct Scatter {
     pub(super) log_det: f64,
     /// Degrees of freedom of the covariance of one lap.
     pub(super) freedom: f64,
+    /// Principal axes of the covariance of one lap, the longest first, each of unit length.
+    axes: DMatrix<f64>,
 }
 
 impl Scatter {
@@ -153,28 +155,43 @@ impl Scatter {
     ) -> Option<Self> {
         let size = recordings.clone().next()?.scatter.nrows();
         let (lap, freedom) = pooled(recordings, size);
-        Self::with(lap, freedom, second.cholesky()?, DMatrix::zeros(size, size))
+        let axes = axes(&lap);
+        Self::with(lap, freedom, second.cholesky()?, DMatrix::zeros(size, size), axes)
     }
 
-    /// The scatter of the laps of these recordings where they are too few to know it well: drawn towards another one's
-    /// correlations as far as they do not contradict them (Ledoit and Wolf 2004); the scatter of the second-order numbers is
-    /// the other's.
+    /// The scatter of the laps of these recordings where they are too few to know it well: drawn towards one that has the
+    /// principal axes of another, as far as chance explains the difference (Ledoit and Wolf 2004); the scatter of the
+    /// second-order numbers is the other's.
     pub(super) fn near<'a>(
         recordings: impl Iterator<Item = &'a Recording> + Clone,
         other: &Self,
     ) -> Option<Self> {
         let (own, freedom) = pooled(recordings, other.open.nrows());
-        let size = own.nrows() as f64;
-        let target = scaled(&other.of_lap(), &own);
-        let root = target.clone().cholesky()?;
-        let left = root.l().solve_lower_triangular(&own)?;
-        let against = root.l().solve_lower_triangular(&left.transpose())?;
-        let apart = (against - DMatrix::identity(own.nrows(), own.nrows())).norm_squared();
-        let by_chance = size * (size + 1.0) / freedom;
+        let size = own.nrows();
+        let along = |covariance: &DMatrix<f64>| other.axes.tr_mul(covariance) * &other.axes;
+        let others = along(&other.of_lap()).diagonal();
+        let along = along(&own);
+        let wider = smoothed(&along.diagonal().component_div(&others));
+        let target = others.component_mul(&wider);
+        let apart: f64 = (0..size)
+            .flat_map(|i| (0..size).map(move |j| (i, j)))
+            .map(|(i, j)| {
+                let chance = along[(i, j)] / (target[i] * target[j]).sqrt();
+                (chance - if i == j { 1.0 } else { 0.0 }).powi(2)
+            })
+            .sum();
+        let by_chance = (size * (size + 1)) as f64 / freedom;
         let share = (by_chance / apart).min(1.0);
         let freedom = ((1.0 - share).powi(2) / freedom + share.powi(2) / other.freedom).recip();
+        let target = &other.axes * DMatrix::from_diagonal(&target) * other.axes.transpose();
         let lap = own * (1.0 - share) + target * share;
-        Self::with(lap, freedom, other.second.clone(), other.open.clone())
+        Self::with(
+            lap,
+            freedom,
+            other.second.clone(),
+            other.open.clone(),
+            other.axes.clone(),
+        )
     }
 
     /// This scatter where the declaration leaves the mean lap open: `directions` are as likely as not, in units of a lap;
@@ -191,7 +208,13 @@ impl Scatter {
     }
 
     /// From a covariance of one lap that was estimated with so many degrees of freedom.
-    fn with(lap: DMatrix<f64>, freedom: f64, second: Cholesky<f64, Dyn>, open: DMatrix<f64>) -> Option<Self> {
+    fn with(
+        lap: DMatrix<f64>,
+        freedom: f64,
+        second: Cholesky<f64, Dyn>,
+        open: DMatrix<f64>,
+        axes: DMatrix<f64>,
+    ) -> Option<Self> {
         let size = lap.nrows();
         let enlarged = &lap * inflation(freedom, size)?;
         let lap = lap.cholesky()?;
@@ -203,6 +226,7 @@ impl Scatter {
             open,
             log_det: 2.0 * logarithms - log_det_bias(freedom, size),
             freedom,
+            axes,
         })
     }
 
@@ -250,18 +274,22 @@ fn pooled<'a>(recordings: impl Iterator<Item = &'a Recording>, size: usize) -> (
     (lap / freedom, freedom)
 }
 
-/// A covariance with the variances of another, stretch by stretch.
-fn scaled(covariance: &DMatrix<f64>, to: &DMatrix<f64>) -> DMatrix<f64> {
-    let mut factors = DVector::zeros(covariance.nrows());
-    for stretch in stretches(covariance.nrows()) {
-        let ratio = (stretch.clone())
-            .map(|i| to[(i, i)] / covariance[(i, i)])
-            .sum::<f64>()
-            / stretch.len() as f64;
-        factors.rows_mut(stretch.start, stretch.len()).fill(ratio.sqrt());
-    }
-    DMatrix::from_fn(covariance.nrows(), covariance.ncols(), |i, j| {
-        factors[i] * covariance[(i, j)] * factors[j]
+/// The principal axes of a covariance, the longest first.
+fn axes(covariance: &DMatrix<f64>) -> DMatrix<f64> {
+    let found = SymmetricEigen::new(covariance.clone());
+    let mut order: Vec<usize> = (0..covariance.nrows()).collect();
+    order.sort_by(|&a, &b| found.eigenvalues[b].total_cmp(&found.eigenvalues[a]));
+    found.eigenvectors.select_columns(&order)
+}
+
+/// Ratios of variances along neighbouring axes: each becomes the geometric mean of those about it.
+fn smoothed(ratios: &DVector<f64>) -> DVector<f64> {
+    const ABOUT: usize = 3;
+    let logarithms = ratios.map(f64::ln);
+    DVector::from_fn(ratios.len(), |i, _| {
+        let first = i.saturating_sub(ABOUT);
+        let last = (i + ABOUT).min(ratios.len() - 1);
+        logarithms.rows(first, last + 1 - first).mean().exp()
     })
 }
 

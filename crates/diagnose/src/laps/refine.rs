@@ -298,7 +298,7 @@ impl Atlas {
 
     /// Data sets at each of so many points that determine the scatter of a lap too: short runs need more of them.
     fn enough(&self, sets: u64, points: u64) -> u64 {
-        const TIMES: usize = 2;
+        const TIMES: usize = 3;
         let freedom: usize = (self.layout.laps.iter())
             .map(|laps| laps.iter().map(|n| n - 2).sum())
             .min()

@@ -167,7 +167,7 @@ fn second_order(runs: &[Vec<DVector<f64>>]) -> DVector<f64> {
 }
 
 /// The entries of a lap's vector in 10 stretches of gates and 5 of durations.
-pub(super) fn stretches(size: usize) -> impl Iterator<Item = Range<usize>> {
+fn stretches(size: usize) -> impl Iterator<Item = Range<usize>> {
     let gates = size - BLOCKS;
     let of_gates = (0..10).map(move |b| b * gates / 10..(b + 1) * gates / 10);
     let of_durations = (0..5).map(move |b| gates + 4 * b..gates + 4 * (b + 1));

@@ -92,16 +92,6 @@ impl FourNumbers {
             .sum()
     }
 
-    /// Probability that one of the first three is as small as it is, where the data scatter less than was expected
-    /// (Bonferroni).
-    pub fn quiet_p(&self) -> f64 {
-        let least = [self.mean, self.runs, self.trend]
-            .map(|q| 1.0 - q.p)
-            .into_iter()
-            .fold(1.0, f64::min);
-        (3.0 * least).min(1.0)
-    }
-
     /// Probability that the smallest of the four is as small as it is: four times that (Bonferroni).
     pub fn omnibus_p(&self) -> f64 {
         let least = [self.mean, self.runs, self.trend, self.noise]
