@@ -306,3 +306,64 @@ fn log_det_bias(freedom: f64, size: usize) -> f64 {
         .map(|i| digamma((freedom - i as f64) / 2.0) - (freedom / 2.0).ln())
         .sum()
 }
+
+#[cfg(test)]
+mod tests {
+    use sim::{Stream, Streams};
+
+    use super::*;
+
+    const SIZE: usize = 30;
+
+    /// Smooth deviations of a size along the lap, and noise of unit variance at every gate.
+    fn covariance(smooth: f64) -> DMatrix<f64> {
+        DMatrix::from_fn(SIZE, SIZE, |i, j| {
+            let apart = i.abs_diff(j) as f64 / 6.0;
+            smooth * (-0.5 * apart * apart).exp() + f64::from(u8::from(i == j))
+        })
+    }
+
+    fn drawn(root: &DMatrix<f64>, stream: &mut Stream) -> DVector<f64> {
+        root * DVector::from_fn(SIZE, |_, _| stream.normal())
+    }
+
+    fn recording(root: &DMatrix<f64>, freedom: usize, stream: &mut Stream) -> Recording {
+        let mut scatter = DMatrix::zeros(SIZE, SIZE);
+        for _ in 0..freedom {
+            let lap = drawn(root, stream);
+            scatter.ger(1.0, &lap, &lap, 1.0);
+        }
+        Recording {
+            runs: Vec::new(),
+            second: DVector::zeros(SECOND),
+            scatter,
+            freedom,
+        }
+    }
+
+    #[test]
+    fn the_scatter_of_few_recordings_is_neither_too_wide_nor_too_narrow() {
+        let declared = covariance(4.0);
+        let axes = axes(&declared);
+        let second = DMatrix::identity(SECOND, SECOND).cholesky().unwrap();
+        let other = Scatter::with(declared, 1e4, second, DMatrix::zeros(SIZE, SIZE), axes).unwrap();
+        // Nine times the smooth variance, the same noise: no multiple of what was declared.
+        for smooth in [4.0, 36.0] {
+            let truth = covariance(smooth).cholesky().unwrap();
+            let log_det = 2.0 * truth.l().diagonal().map(f64::ln).sum();
+            let mut stream = Streams { seed: 5, run: 0 }.open("laps");
+            let (mut squares, mut off) = (0.0, 0.0);
+            const TIMES: usize = 40;
+            for _ in 0..TIMES {
+                let few = recording(&truth.l(), 3 * SIZE, &mut stream);
+                let scatter = Scatter::near(std::iter::once(&few), &other).unwrap();
+                let fresh = drawn(&truth.l(), &mut stream);
+                squares += scatter.whiten(&fresh).norm_squared() / TIMES as f64;
+                off += (scatter.log_det - log_det) / TIMES as f64;
+            }
+            // 30 +- 1.2 by chance.
+            assert!((squares - 30.0).abs() < 3.6, "{smooth}: {squares}");
+            assert!(off.abs() < 1.0, "{smooth}: {off}");
+        }
+    }
+}

@@ -2,6 +2,7 @@
 
 use super::atlas::{Atlas, White, white};
 use super::expectation::{Expectation, Scatter};
+use super::simulated::Evaluated;
 use super::summary::Summary;
 
 /// How far the expectation of a simulated hypothesis may be off.
@@ -11,14 +12,6 @@ pub(super) struct Doubt {
     pub(super) error: f64,
     /// Whether all runs were taken to be alike, so that they share one error.
     pub(super) alike: bool,
-}
-
-/// A hypothesis simulated.
-#[derive(Clone)]
-pub(super) struct Evaluated {
-    pub(super) expectation: Expectation,
-    pub(super) doubt: Doubt,
-    pub(super) summaries: Vec<Summary>,
 }
 
 /// What a simulated hypothesis leaves of the data.

@@ -6,15 +6,18 @@ mod detectable;
 mod diagnosis;
 mod expectation;
 mod groups;
+mod hunt;
 mod hypothesis;
 mod layout;
 mod likelihood;
 mod pairs;
+mod parabola;
 mod probe;
 mod refine;
 mod screen;
 mod search;
 mod separation;
+mod simulated;
 mod summary;
 mod tests_of_fit;
 

@@ -1,18 +1,15 @@
 //! The size of a hypothesis by simulation, and how well it then explains the data.
 
-use std::ops::Range;
+use nalgebra::DVector;
+use sim::Setting;
 
-use nalgebra::{DMatrix, DVector};
-use rayon::prelude::*;
-use sim::{Pattern, Setting};
-
-use super::atlas::{Atlas, Simulate, White, white};
-use super::expectation::{Expectation, Scatter};
-use super::hypothesis::{Freedom, Hypothesis, Part, Shape};
-use super::layout::Layout;
-use super::likelihood::{Doubt, Evaluated, Fit};
+use super::atlas::{Atlas, Simulate, white};
+use super::expectation::Expectation;
+use super::hypothesis::{Freedom, Hypothesis};
+use super::likelihood::Fit;
+use super::parabola::{Column, Local, left_of, nearest};
 use super::screen::price;
-use super::summary::Summary;
+use super::simulated::Evaluated;
 use crate::Error;
 
 /// What is simulated in a round of a descent.
@@ -39,10 +36,8 @@ impl Round {
 /// Numbers to fit from which there are many.
 const MANY: usize = 5;
 
-/// Data sets simulated of every hypothesis that comes to the end, of the best, and of it and others that explain nearly as
-/// much.
+/// Data sets simulated of every hypothesis that comes to the end, and of the best and others that explain nearly as much.
 const END_SETS: u64 = 16;
-pub(super) const FINAL_SETS: u64 = 32;
 pub(super) const CLOSE_SETS: u64 = 64;
 
 /// A hypothesis at its most likely sizes.
@@ -97,6 +92,16 @@ impl Descent {
         }
     }
 
+    /// A hypothesis whose sizes were found otherwise, each to within an error.
+    pub(super) fn found(atlas: &Atlas, hypothesis: &Hypothesis, error: f64) -> Self {
+        let start = Self::start(atlas, hypothesis);
+        Self {
+            errors: vec![error; start.freedoms.len()],
+            found: true,
+            ..start
+        }
+    }
+
     fn errors(&self) -> Vec<(Freedom, f64)> {
         self.freedoms
             .iter()
@@ -144,7 +149,12 @@ impl Atlas {
             mut errors,
             ..
         } = descent;
-        let local = self.local(simulate, &hypothesis, &freedoms, round)?;
+        let local = self.local(
+            simulate,
+            &hypothesis,
+            &freedoms,
+            self.sets_at(&freedoms, round, 3),
+        )?;
         let target = white(&local.scatter, &self.layout, data, &local.center);
         let (moves, covariance) = nearest(&local.columns, &target, &freedoms);
         let left = left_of(&local.columns, &target, &moves);
@@ -206,7 +216,12 @@ impl Atlas {
         hypothesis: &Hypothesis,
     ) -> Result<Vec<Vec<Setting>>, Error> {
         let freedoms = hypothesis.freedoms(self);
-        let local = self.local(simulate, hypothesis, &freedoms, Round::Full);
+        let local = self.local(
+            simulate,
+            hypothesis,
+            &freedoms,
+            self.sets_at(&freedoms, Round::Full, 3),
+        );
         let fit_without = |run: usize| {
             let found = match &local {
                 Some(local) => self.fit_without(run, local, runs, hypothesis, &freedoms)?,
@@ -296,17 +311,6 @@ impl Atlas {
         Some(Settled { refined, evaluated })
     }
 
-    /// Data sets at each of so many points that determine the scatter of a lap too: short runs need more of them.
-    fn enough(&self, sets: u64, points: u64) -> u64 {
-        const TIMES: usize = 3;
-        let freedom: usize = (self.layout.laps.iter())
-            .map(|laps| laps.iter().map(|n| n - 2).sum())
-            .min()
-            .unwrap_or(1);
-        let needed = (TIMES * self.layout.lap).div_ceil(freedom) as u64;
-        sets.max(needed.div_ceil(points)).min(self.samples.len() as u64)
-    }
-
     /// What a hypothesis pays for its fitted numbers and for the choice of its probes.
     fn price_of(&self, hypothesis: &Hypothesis) -> f64 {
         let choices: f64 = hypothesis.parts.iter().map(|part| self.choice(part.probe)).sum();
@@ -326,375 +330,4 @@ impl Atlas {
         }
         hypothesis
     }
-
-    /// What a hypothesis leaves of the data, in units of the declared model's scatter; `None` where the robot crashes.
-    pub(super) fn left_by(
-        &self,
-        simulate: &Simulate<'_>,
-        data: &Expectation,
-        hypothesis: &Hypothesis,
-    ) -> Option<White> {
-        let evaluated = self.evaluate(simulate, hypothesis, self.enough(FINAL_SETS, 1))?;
-        Some(self.white(data, &evaluated.expectation))
-    }
-
-    /// What one step of each of these numbers of probes does, by the same draws; `None` where the robot crashes.
-    pub(super) fn actions(
-        &self,
-        simulate: &Simulate<'_>,
-        numbers: &[(usize, usize)],
-        sets: u64,
-    ) -> Vec<Option<White>> {
-        let same_draws = Expectation::mean(&self.samples[..sets as usize], true);
-        numbers
-            .par_iter()
-            .map(|&(probe, number)| {
-                let setting = [self.probes[probe].step(number)];
-                let found = self.simulated_plainly(simulate, &setting, sets)?;
-                Some(self.white(&found, &same_draws))
-            })
-            .collect()
-    }
-
-    fn simulated_plainly(
-        &self,
-        simulate: &Simulate<'_>,
-        settings: &[Setting],
-        sets: u64,
-    ) -> Option<Expectation> {
-        self.spent.add(sets);
-        let summaries: Vec<Summary> = (0..sets)
-            .map(|set| self.summary(simulate, settings, set))
-            .collect::<Option<_>>()?;
-        Some(Expectation::of(summaries.iter(), true))
-    }
-
-    /// The size of an effect that jumps, by trying many: all over the probe's range, then ever closer about the best. `None`
-    /// where no size explains a fair share.
-    pub(super) fn hunt(&self, simulate: &Simulate<'_>, data: &Expectation, probe: usize) -> Option<Descent> {
-        const COARSE: usize = 60;
-        const COARSE_SETS: u64 = 1;
-        const CLOSER: [u64; 3] = [4, 8, 12];
-        const FAIR_SHARE: f64 = 0.25;
-        let p = &self.probes[probe];
-        let (low, high) = (p.sizes[0], p.sizes[p.sizes.len() - 1]);
-        // Sizes in a constant ratio: what matters is how many steps fit into a speed or a reading.
-        let ratio = (high / low).powf(1.0 / (COARSE - 1) as f64);
-        let sizes: Vec<f64> = (0..COARSE).map(|i| low * ratio.powi(i as i32)).collect();
-        let (left, mut best) = least(&self.distances(simulate, data, probe, &sizes, COARSE_SETS))?;
-        if left > (1.0 - FAIR_SHARE) * self.white(data, &self.null).norm_squared() {
-            return None;
-        }
-        let mut spacing = best * (ratio - 1.0);
-        let mut last = Vec::new();
-        for sets in CLOSER {
-            let sizes: Vec<f64> = (-4..=4).map(|i| best + spacing * f64::from(i) / 3.0).collect();
-            last = self.distances(simulate, data, probe, &sizes, sets);
-            best = least(&last)?.1;
-            spacing /= 3.0;
-        }
-        // Sizes that are no worse than by 4 in squared distance bound the answer.
-        let bound = least(&last)?.0 + 4.0;
-        let as_good = last
-            .iter()
-            .filter(|found| found.0 < bound)
-            .map(|found| (found.1 - best).abs());
-        let error = as_good.fold(spacing / 2.0, f64::max);
-        let hypothesis = Hypothesis {
-            parts: vec![Part::screened(self, probe, Shape::Constant, &[best])],
-        };
-        let start = Descent::start(self, &hypothesis);
-        Some(Descent {
-            errors: vec![error; start.freedoms.len()],
-            found: true,
-            ..start
-        })
-    }
-
-    /// Squared distances of the data from a probe at some sizes, each with its size; sizes at which the robot crashes are
-    /// left out.
-    fn distances(
-        &self,
-        simulate: &Simulate<'_>,
-        data: &Expectation,
-        probe: usize,
-        sizes: &[f64],
-        sets: u64,
-    ) -> Vec<(f64, f64)> {
-        let same_draws = Expectation::mean(&self.samples[..sets as usize], true);
-        let distance = |&size: &f64| {
-            let settings = [self.probes[probe].setting(size)];
-            let found = self.simulated_plainly(simulate, &settings, sets)?;
-            let expected = found.moved(1.0, &same_draws, &self.null);
-            Some((self.white(data, &expected).norm_squared(), size))
-        };
-        sizes.par_iter().filter_map(distance).collect()
-    }
-
-    /// What effects leave of the data, in units of their own scatter; `None` where the robot crashes.
-    pub(super) fn remainder(
-        &self,
-        simulate: &Simulate<'_>,
-        data: &Expectation,
-        effects: &[Setting],
-    ) -> Option<White> {
-        let alike = !effects.iter().any(|e| matches!(e.pattern, Pattern::ByRun(_)));
-        let end = self.simulated(simulate, effects, alike, self.enough(FINAL_SETS, 1))?;
-        Some(self.fit(data, &end)?.residual)
-    }
-
-    fn evaluate(&self, simulate: &Simulate<'_>, hypothesis: &Hypothesis, sets: u64) -> Option<Evaluated> {
-        self.simulated(simulate, &hypothesis.settings(self), hypothesis.alike(), sets)
-    }
-
-    fn evaluate_more(
-        &self,
-        simulate: &Simulate<'_>,
-        hypothesis: &Hypothesis,
-        evaluated: Evaluated,
-        sets: u64,
-    ) -> Option<Evaluated> {
-        let mut summaries = evaluated.summaries;
-        let done = summaries.len() as u64;
-        summaries.extend(self.summaries(simulate, &hypothesis.settings(self), done..sets.max(done))?);
-        Some(self.evaluated(summaries, hypothesis.alike()))
-    }
-
-    fn simulated(
-        &self,
-        simulate: &Simulate<'_>,
-        settings: &[Setting],
-        alike: bool,
-        sets: u64,
-    ) -> Option<Evaluated> {
-        let summaries = self.summaries(simulate, settings, 0..sets)?;
-        Some(self.evaluated(summaries, alike))
-    }
-
-    fn summaries(
-        &self,
-        simulate: &Simulate<'_>,
-        settings: &[Setting],
-        sets: Range<u64>,
-    ) -> Option<Vec<Summary>> {
-        self.spent.add(sets.end - sets.start);
-        sets.into_par_iter()
-            .map(|set| self.summary(simulate, settings, set))
-            .collect()
-    }
-
-    /// What simulated data sets say of their hypothesis. What their draws did to the declared model is taken off as far as
-    /// it helps (a control variate).
-    fn evaluated(&self, summaries: Vec<Summary>, alike: bool) -> Evaluated {
-        let sets = summaries.len();
-        let mean = Expectation::of(summaries.iter(), alike);
-        let declared = &self.samples[..sets];
-        let declared_mean = Expectation::mean(declared, alike);
-        let (mut both, mut own) = (0.0, 0.0);
-        for (summary, sample) in summaries.iter().zip(declared) {
-            let sample = self.white(sample, &declared_mean);
-            both += self
-                .white(&Expectation::of(std::iter::once(summary), false), &mean)
-                .dot(&sample);
-            own += sample.norm_squared();
-        }
-        let share = (both / own).clamp(0.0, 1.0);
-        let expectation = mean.moved(share, &declared_mean, &self.null);
-        let error = (1.0 - share * share) / sets as f64 + share * share / self.samples.len() as f64;
-        Evaluated {
-            expectation,
-            doubt: Doubt { error, alike },
-            summaries,
-        }
-    }
-
-    /// A hypothesis and its neighbourhood.
-    fn local(
-        &self,
-        simulate: &Simulate<'_>,
-        hypothesis: &Hypothesis,
-        freedoms: &[Freedom],
-        round: Round,
-    ) -> Option<Local> {
-        let sets = self.sets_at(freedoms, round, 3);
-        let center = self.evaluate(simulate, hypothesis, sets)?;
-        let mut sides = Vec::with_capacity(freedoms.len());
-        for group in groups(freedoms) {
-            let at = |sign: f64| {
-                let moves: Vec<(Freedom, f64)> = group.iter().map(|f| (*f, sign * f.step)).collect();
-                let moved = hypothesis.moved(self, &moves);
-                let by: Vec<f64> = group.iter().map(|f| moved.get(f) - hypothesis.get(f)).collect();
-                self.evaluate(simulate, &moved, sets)
-                    .map(|evaluated| (by, evaluated))
-            };
-            // Where the robot crashes on one side, the other one tells the slope.
-            let nowhere = |side: Option<(Vec<f64>, Evaluated)>| {
-                side.unwrap_or_else(|| (vec![0.0; group.len()], center.clone()))
-            };
-            let (down, up) = (at(-1.0), at(1.0));
-            if down.is_none() && up.is_none() {
-                return None;
-            }
-            let (down, up) = (nowhere(down), nowhere(up));
-            sides.push((group, down, up));
-        }
-        let all = sides
-            .iter()
-            .flat_map(|(_, a, b)| a.1.summaries.iter().chain(&b.1.summaries));
-        let scatter = self.scatter_of(center.summaries.iter().chain(all))?;
-        let action = |e: &Evaluated| white(&scatter, &self.layout, &e.expectation, &center.expectation);
-        let mut columns = Vec::new();
-        for (group, (down_by, down), (up_by, up)) in &sides {
-            let (down, up) = (action(down), action(up));
-            for (i, freedom) in group.iter().enumerate() {
-                let mask = |w: &White| {
-                    freedom
-                        .run()
-                        .map_or_else(|| w.clone(), |run| of_run(w, run, &self.layout))
-                };
-                columns.push(Column::through((down_by[i], mask(&down)), (up_by[i], mask(&up))));
-            }
-        }
-        Some(Local {
-            center: center.expectation,
-            doubt: center.doubt,
-            scatter,
-            columns,
-        })
-    }
-}
-
-/// The least of some distances, with its size.
-fn least(found: &[(f64, f64)]) -> Option<(f64, f64)> {
-    found.iter().copied().min_by(|a, b| a.0.total_cmp(&b.0))
-}
-
-/// Freedoms that are moved together: the sizes of one part in its runs.
-fn groups(freedoms: &[Freedom]) -> Vec<Vec<Freedom>> {
-    let mut groups: Vec<Vec<Freedom>> = Vec::new();
-    for freedom in freedoms {
-        match groups.last_mut() {
-            Some(group) if freedom.run().is_some() && freedom.is_beside(&group[0]) => group.push(*freedom),
-            _ => groups.push(vec![*freedom]),
-        }
-    }
-    groups
-}
-
-/// What one run's size does: that run's mean, and its share of its recording's trend and second-order numbers.
-fn of_run(action: &White, run: usize, layout: &Layout) -> White {
-    let mut own = White::zeros(action.len());
-    let recording = layout.places().nth(run).map_or(0, |at| at.0);
-    let share = 1.0 / layout.laps[recording].len() as f64;
-    for (range, share) in [
-        (layout.run(run), 1.0),
-        (layout.trend(recording), share),
-        (layout.second(recording), share),
-    ] {
-        own.rows_mut(range.start, range.len())
-            .axpy(share, &action.rows(range.start, range.len()), 1.0);
-    }
-    own
-}
-
-/// A hypothesis and its neighbourhood.
-#[derive(Debug, Clone)]
-struct Local {
-    center: Expectation,
-    doubt: Doubt,
-    scatter: Vec<Scatter>,
-    columns: Vec<Column>,
-}
-
-/// The action of one number: slope and curvature.
-#[derive(Debug, Clone)]
-struct Column {
-    slope: White,
-    curvature: White,
-}
-
-impl Column {
-    /// The same parabola as seen from another point of it.
-    fn from(&self, moved: f64) -> Self {
-        Self {
-            slope: &self.slope + &self.curvature * (2.0 * moved),
-            curvature: self.curvature.clone(),
-        }
-    }
-
-    /// The parabola through the origin and two points.
-    fn through(down: (f64, White), up: (f64, White)) -> Self {
-        let (a, b) = (down.0, up.0);
-        if a == 0.0 || b == 0.0 {
-            // At the end of the range there is one side only.
-            let (by, action) = if a == 0.0 { up } else { down };
-            let slope = if by == 0.0 { action * 0.0 } else { action / by };
-            return Self {
-                curvature: &slope * 0.0,
-                slope,
-            };
-        }
-        let curvature = (&up.1 / b - &down.1 / a) / (b - a);
-        let slope = &up.1 / b - &curvature * b;
-        Self { slope, curvature }
-    }
-}
-
-/// The moves that bring the parabolas nearest to the target, and their covariance.
-fn nearest(columns: &[Column], target: &White, freedoms: &[Freedom]) -> (DVector<f64>, DMatrix<f64>) {
-    let count = columns.len();
-    let mut moves = DVector::<f64>::zeros(count);
-    let mut normal = DMatrix::identity(count, count);
-    for _ in 0..30 {
-        let left = left_of(columns, target, &moves);
-        let slopes: Vec<White> = columns
-            .iter()
-            .zip(moves.iter())
-            .map(|(c, m)| &c.slope + &c.curvature * (2.0 * m))
-            .collect();
-        normal = DMatrix::from_fn(count, count, |i, j| slopes[i].dot(&slopes[j]));
-        // A number without action stays where it is.
-        for (i, freedom) in freedoms.iter().enumerate() {
-            normal[(i, i)] += 1e-6 / (freedom.step * freedom.step);
-        }
-        let gradient = DVector::from_fn(count, |i, _| slopes[i].dot(&left));
-        let Some(step) = normal.clone().cholesky().map(|f| f.solve(&gradient)) else {
-            break;
-        };
-        let mut share = 1.0;
-        let mut next = bounded(&moves, &step, share, freedoms);
-        while left_of(columns, target, &next).norm_squared() > left.norm_squared() && share > 1e-3 {
-            share *= 0.5;
-            next = bounded(&moves, &step, share, freedoms);
-        }
-        let change = (&next - &moves)
-            .component_div(&DVector::from_fn(count, |i, _| freedoms[i].step))
-            .amax();
-        moves = next;
-        if change < 1e-6 {
-            break;
-        }
-    }
-    let covariance = normal
-        .cholesky()
-        .map_or_else(|| DMatrix::identity(count, count), |f| f.inverse());
-    (moves, covariance)
-}
-
-/// What the parabolas at some moves leave of the target.
-fn left_of(columns: &[Column], target: &White, moves: &DVector<f64>) -> White {
-    let mut left = target.clone();
-    for (column, &m) in columns.iter().zip(moves.iter()) {
-        left.axpy(-m, &column.slope, 1.0);
-        left.axpy(-m * m, &column.curvature, 1.0);
-    }
-    left
-}
-
-/// A parabola is trusted for twice the step it was made with.
-fn bounded(moves: &DVector<f64>, step: &DVector<f64>, share: f64, freedoms: &[Freedom]) -> DVector<f64> {
-    DVector::from_fn(moves.len(), |i, _| {
-        let most = 2.5 * freedoms[i].step;
-        (moves[i] + share * step[i]).clamp(-most, most)
-    })
 }

@@ -6,8 +6,9 @@ use rayon::prelude::*;
 use super::atlas::{Atlas, Simulate, White};
 use super::expectation::Expectation;
 use super::hypothesis::{Hypothesis, Part};
-use super::refine::{CLOSE_SETS, Descent, FINAL_SETS, Refined, Round, Settled};
+use super::refine::{CLOSE_SETS, Descent, Refined, Round, Settled};
 use super::screen::Screened;
+use super::simulated::FINAL_SETS;
 use super::tests_of_fit::FourNumbers;
 use crate::{Candidate, Explanation};
 

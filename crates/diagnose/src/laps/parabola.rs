@@ -1,0 +1,201 @@
+//! The neighbourhood of a hypothesis: what a step in each of its numbers does to the expectation, as parabolas, and where
+//! on them the data are nearest.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::atlas::{Atlas, Simulate, White, white};
+use super::expectation::{Expectation, Scatter};
+use super::hypothesis::{Freedom, Hypothesis};
+use super::layout::Layout;
+use super::likelihood::Doubt;
+use super::simulated::Evaluated;
+
+impl Atlas {
+    /// A hypothesis and its neighbourhood, each point simulated with so many data sets; `None` where the robot crashes.
+    pub(super) fn local(
+        &self,
+        simulate: &Simulate<'_>,
+        hypothesis: &Hypothesis,
+        freedoms: &[Freedom],
+        sets: u64,
+    ) -> Option<Local> {
+        let center = self.evaluate(simulate, hypothesis, sets)?;
+        let mut sides = Vec::with_capacity(freedoms.len());
+        for group in groups(freedoms) {
+            let at = |sign: f64| {
+                let moves: Vec<(Freedom, f64)> = group.iter().map(|f| (*f, sign * f.step)).collect();
+                let moved = hypothesis.moved(self, &moves);
+                let by: Vec<f64> = group.iter().map(|f| moved.get(f) - hypothesis.get(f)).collect();
+                self.evaluate(simulate, &moved, sets)
+                    .map(|evaluated| (by, evaluated))
+            };
+            // Where the robot crashes on one side, the other one tells the slope.
+            let nowhere = |side: Option<(Vec<f64>, Evaluated)>| {
+                side.unwrap_or_else(|| (vec![0.0; group.len()], center.clone()))
+            };
+            let (down, up) = (at(-1.0), at(1.0));
+            if down.is_none() && up.is_none() {
+                return None;
+            }
+            let (down, up) = (nowhere(down), nowhere(up));
+            sides.push((group, down, up));
+        }
+        let all = sides
+            .iter()
+            .flat_map(|(_, a, b)| a.1.summaries.iter().chain(&b.1.summaries));
+        let scatter = self.scatter_of(center.summaries.iter().chain(all))?;
+        let action = |e: &Evaluated| white(&scatter, &self.layout, &e.expectation, &center.expectation);
+        let mut columns = Vec::new();
+        for (group, (down_by, down), (up_by, up)) in &sides {
+            let (down, up) = (action(down), action(up));
+            for (i, freedom) in group.iter().enumerate() {
+                let mask = |w: &White| {
+                    freedom
+                        .run()
+                        .map_or_else(|| w.clone(), |run| of_run(w, run, &self.layout))
+                };
+                columns.push(Column::through((down_by[i], mask(&down)), (up_by[i], mask(&up))));
+            }
+        }
+        Some(Local {
+            center: center.expectation,
+            doubt: center.doubt,
+            scatter,
+            columns,
+        })
+    }
+}
+
+/// Freedoms that are moved together: the sizes of one part in its runs.
+fn groups(freedoms: &[Freedom]) -> Vec<Vec<Freedom>> {
+    let mut groups: Vec<Vec<Freedom>> = Vec::new();
+    for freedom in freedoms {
+        match groups.last_mut() {
+            Some(group) if freedom.run().is_some() && freedom.is_beside(&group[0]) => group.push(*freedom),
+            _ => groups.push(vec![*freedom]),
+        }
+    }
+    groups
+}
+
+/// What one run's size does: that run's mean, and its share of its recording's trend and second-order numbers.
+fn of_run(action: &White, run: usize, layout: &Layout) -> White {
+    let mut own = White::zeros(action.len());
+    let recording = layout.places().nth(run).map_or(0, |at| at.0);
+    let share = 1.0 / layout.laps[recording].len() as f64;
+    for (range, share) in [
+        (layout.run(run), 1.0),
+        (layout.trend(recording), share),
+        (layout.second(recording), share),
+    ] {
+        own.rows_mut(range.start, range.len())
+            .axpy(share, &action.rows(range.start, range.len()), 1.0);
+    }
+    own
+}
+
+/// A hypothesis and its neighbourhood.
+#[derive(Debug, Clone)]
+pub(super) struct Local {
+    pub(super) center: Expectation,
+    pub(super) doubt: Doubt,
+    pub(super) scatter: Vec<Scatter>,
+    pub(super) columns: Vec<Column>,
+}
+
+/// The action of one number: slope and curvature.
+#[derive(Debug, Clone)]
+pub(super) struct Column {
+    pub(super) slope: White,
+    pub(super) curvature: White,
+}
+
+impl Column {
+    /// The same parabola as seen from another point of it.
+    pub(super) fn from(&self, moved: f64) -> Self {
+        Self {
+            slope: &self.slope + &self.curvature * (2.0 * moved),
+            curvature: self.curvature.clone(),
+        }
+    }
+
+    /// The parabola through the origin and two points.
+    fn through(down: (f64, White), up: (f64, White)) -> Self {
+        let (a, b) = (down.0, up.0);
+        if a == 0.0 || b == 0.0 {
+            // At the end of the range there is one side only.
+            let (by, action) = if a == 0.0 { up } else { down };
+            let slope = if by == 0.0 { action * 0.0 } else { action / by };
+            return Self {
+                curvature: &slope * 0.0,
+                slope,
+            };
+        }
+        let curvature = (&up.1 / b - &down.1 / a) / (b - a);
+        let slope = &up.1 / b - &curvature * b;
+        Self { slope, curvature }
+    }
+}
+
+/// The moves that bring the parabolas nearest to the target, and their covariance.
+pub(super) fn nearest(
+    columns: &[Column],
+    target: &White,
+    freedoms: &[Freedom],
+) -> (DVector<f64>, DMatrix<f64>) {
+    let count = columns.len();
+    let mut moves = DVector::<f64>::zeros(count);
+    let mut normal = DMatrix::identity(count, count);
+    for _ in 0..30 {
+        let left = left_of(columns, target, &moves);
+        let slopes: Vec<White> = columns
+            .iter()
+            .zip(moves.iter())
+            .map(|(c, m)| &c.slope + &c.curvature * (2.0 * m))
+            .collect();
+        normal = DMatrix::from_fn(count, count, |i, j| slopes[i].dot(&slopes[j]));
+        // A number without action stays where it is.
+        for (i, freedom) in freedoms.iter().enumerate() {
+            normal[(i, i)] += 1e-6 / (freedom.step * freedom.step);
+        }
+        let gradient = DVector::from_fn(count, |i, _| slopes[i].dot(&left));
+        let Some(step) = normal.clone().cholesky().map(|f| f.solve(&gradient)) else {
+            break;
+        };
+        let mut share = 1.0;
+        let mut next = bounded(&moves, &step, share, freedoms);
+        while left_of(columns, target, &next).norm_squared() > left.norm_squared() && share > 1e-3 {
+            share *= 0.5;
+            next = bounded(&moves, &step, share, freedoms);
+        }
+        let change = (&next - &moves)
+            .component_div(&DVector::from_fn(count, |i, _| freedoms[i].step))
+            .amax();
+        moves = next;
+        if change < 1e-6 {
+            break;
+        }
+    }
+    let covariance = normal
+        .cholesky()
+        .map_or_else(|| DMatrix::identity(count, count), |f| f.inverse());
+    (moves, covariance)
+}
+
+/// What the parabolas at some moves leave of the target.
+pub(super) fn left_of(columns: &[Column], target: &White, moves: &DVector<f64>) -> White {
+    let mut left = target.clone();
+    for (column, &m) in columns.iter().zip(moves.iter()) {
+        left.axpy(-m, &column.slope, 1.0);
+        left.axpy(-m * m, &column.curvature, 1.0);
+    }
+    left
+}
+
+/// A parabola is trusted for twice the step it was made with.
+fn bounded(moves: &DVector<f64>, step: &DVector<f64>, share: f64, freedoms: &[Freedom]) -> DVector<f64> {
+    DVector::from_fn(moves.len(), |i, _| {
+        let most = 2.5 * freedoms[i].step;
+        (moves[i] + share * step[i]).clamp(-most, most)
+    })
+}

@@ -1,0 +1,160 @@
+//! What hypotheses lead one to expect, by simulation.
+
+use std::ops::Range;
+
+use rayon::prelude::*;
+use sim::{Pattern, Setting};
+
+use super::atlas::{Atlas, Simulate, White};
+use super::expectation::Expectation;
+use super::hypothesis::Hypothesis;
+use super::likelihood::Doubt;
+use super::summary::Summary;
+
+/// Data sets simulated of a hypothesis that is judged.
+pub(super) const FINAL_SETS: u64 = 32;
+
+/// A hypothesis simulated.
+#[derive(Clone)]
+pub(super) struct Evaluated {
+    pub(super) expectation: Expectation,
+    pub(super) doubt: Doubt,
+    pub(super) summaries: Vec<Summary>,
+}
+
+impl Atlas {
+    /// Data sets at each of so many points that determine the scatter of a lap too: short runs need more of them.
+    pub(super) fn enough(&self, sets: u64, points: u64) -> u64 {
+        const TIMES: usize = 3;
+        let freedom: usize = (self.layout.laps.iter())
+            .map(|laps| laps.iter().map(|n| n - 2).sum())
+            .min()
+            .unwrap_or(1);
+        let needed = (TIMES * self.layout.lap).div_ceil(freedom) as u64;
+        sets.max(needed.div_ceil(points)).min(self.samples.len() as u64)
+    }
+
+    /// What a hypothesis leaves of the data, in units of the declared model's scatter; `None` where the robot crashes.
+    pub(super) fn left_by(
+        &self,
+        simulate: &Simulate<'_>,
+        data: &Expectation,
+        hypothesis: &Hypothesis,
+    ) -> Option<White> {
+        let evaluated = self.evaluate(simulate, hypothesis, self.enough(FINAL_SETS, 1))?;
+        Some(self.white(data, &evaluated.expectation))
+    }
+
+    /// What one step of each of these numbers of probes does, by the same draws; `None` where the robot crashes.
+    pub(super) fn actions(
+        &self,
+        simulate: &Simulate<'_>,
+        numbers: &[(usize, usize)],
+        sets: u64,
+    ) -> Vec<Option<White>> {
+        let same_draws = Expectation::mean(&self.samples[..sets as usize], true);
+        numbers
+            .par_iter()
+            .map(|&(probe, number)| {
+                let setting = [self.probes[probe].step(number)];
+                let found = self.simulated_plainly(simulate, &setting, sets)?;
+                Some(self.white(&found, &same_draws))
+            })
+            .collect()
+    }
+
+    pub(super) fn simulated_plainly(
+        &self,
+        simulate: &Simulate<'_>,
+        settings: &[Setting],
+        sets: u64,
+    ) -> Option<Expectation> {
+        self.spent.add(sets);
+        let summaries: Vec<Summary> = (0..sets)
+            .map(|set| self.summary(simulate, settings, set))
+            .collect::<Option<_>>()?;
+        Some(Expectation::of(summaries.iter(), true))
+    }
+
+    /// What effects leave of the data, in units of their own scatter; `None` where the robot crashes.
+    pub(super) fn remainder(
+        &self,
+        simulate: &Simulate<'_>,
+        data: &Expectation,
+        effects: &[Setting],
+    ) -> Option<White> {
+        let alike = !effects.iter().any(|e| matches!(e.pattern, Pattern::ByRun(_)));
+        let end = self.simulated(simulate, effects, alike, self.enough(FINAL_SETS, 1))?;
+        Some(self.fit(data, &end)?.residual)
+    }
+
+    pub(super) fn evaluate(
+        &self,
+        simulate: &Simulate<'_>,
+        hypothesis: &Hypothesis,
+        sets: u64,
+    ) -> Option<Evaluated> {
+        self.simulated(simulate, &hypothesis.settings(self), hypothesis.alike(), sets)
+    }
+
+    pub(super) fn evaluate_more(
+        &self,
+        simulate: &Simulate<'_>,
+        hypothesis: &Hypothesis,
+        evaluated: Evaluated,
+        sets: u64,
+    ) -> Option<Evaluated> {
+        let mut summaries = evaluated.summaries;
+        let done = summaries.len() as u64;
+        summaries.extend(self.summaries(simulate, &hypothesis.settings(self), done..sets.max(done))?);
+        Some(self.evaluated(summaries, hypothesis.alike()))
+    }
+
+    fn simulated(
+        &self,
+        simulate: &Simulate<'_>,
+        settings: &[Setting],
+        alike: bool,
+        sets: u64,
+    ) -> Option<Evaluated> {
+        let summaries = self.summaries(simulate, settings, 0..sets)?;
+        Some(self.evaluated(summaries, alike))
+    }
+
+    fn summaries(
+        &self,
+        simulate: &Simulate<'_>,
+        settings: &[Setting],
+        sets: Range<u64>,
+    ) -> Option<Vec<Summary>> {
+        self.spent.add(sets.end - sets.start);
+        sets.into_par_iter()
+            .map(|set| self.summary(simulate, settings, set))
+            .collect()
+    }
+
+    /// What simulated data sets say of their hypothesis. What their draws did to the declared model is taken off as far as
+    /// it helps (a control variate).
+    fn evaluated(&self, summaries: Vec<Summary>, alike: bool) -> Evaluated {
+        let sets = summaries.len();
+        let mean = Expectation::of(summaries.iter(), alike);
+        let declared = &self.samples[..sets];
+        let declared_mean = Expectation::mean(declared, alike);
+        let (mut both, mut own) = (0.0, 0.0);
+        for (summary, sample) in summaries.iter().zip(declared) {
+            let sample = self.white(sample, &declared_mean);
+            both += self
+                .white(&Expectation::of(std::iter::once(summary), false), &mean)
+                .dot(&sample);
+            own += sample.norm_squared();
+        }
+        let share = (both / own).clamp(0.0, 1.0);
+        let expectation = mean.moved(share, &declared_mean, &self.null);
+        let error = (1.0 - share * share) / sets as f64 + share * share / self.samples.len() as f64;
+        Evaluated {
+            expectation,
+            doubt: Doubt { error, alike },
+            summaries,
+        }
+    }
+}
