@@ -382,15 +382,17 @@ impl<'a> Search<'a> {
         let Some(traces) = self.evidence.traces(&[]) else {
             return Vec::new();
         };
-        (pairs(&traces, &self.variants, &list, 3).par_iter())
-            .filter_map(|pair| {
-                let parts = pair
-                    .parts
-                    .clone()
-                    .map(|(i, setting)| (self.variants[i].clone(), setting));
-                together(&self.evidence, &parts, self.total())
-            })
-            .collect()
+        (pairs(&traces, &self.variants, &list, 3)
+            .unwrap_or_default()
+            .par_iter())
+        .filter_map(|pair| {
+            let parts = pair
+                .parts
+                .clone()
+                .map(|(i, setting)| (self.variants[i].clone(), setting));
+            together(&self.evidence, &parts, self.total())
+        })
+        .collect()
     }
 
     /// What is left beside the best explanation, and whether that makes it dishonest to name it.

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 use sim::{Forecast, Model, Pattern, Scene, Setting, World};
 
 use super::catalogue::stage_of;
-use super::columns::column;
+use super::columns::columns;
 use super::filter::{Trace, Used, clear_readings, filter};
 use super::rows::{LogRow, stretches};
 use super::screen::{Normal, normal_of};
@@ -182,10 +182,7 @@ impl<'a> Evidence<'a> {
             .map(|stretch| {
                 let world = self.world(settings, stretch.run).ok()?;
                 let trace = filter(&world, stretch.rows, Some(&stretch.used), self.step_counts)?;
-                let columns = knobs
-                    .par_iter()
-                    .map(|knob| self.derivative(&world, &trace, settings, knob))
-                    .collect::<Option<Vec<_>>>()?;
+                let columns = self.derivatives(&world, &trace, settings, knobs)?;
                 Some((trace.log_likelihood, normal_of(&trace, &columns)))
             })
             .collect();
@@ -196,25 +193,36 @@ impl<'a> Evidence<'a> {
         })
     }
 
-    /// Change of the whitened innovations for one step of a knob, from the side that is inside its range.
-    fn derivative(
+    /// Change of the whitened innovations for one step of each knob, from the side that is inside its range.
+    fn derivatives(
         &self,
         world: &World<'a>,
         trace: &Trace,
         settings: &[Setting],
-        knob: &Knob,
-    ) -> Option<Vec<f32>> {
-        let run = world.run();
-        let mut sign = 1.0;
-        let mut turned = knob.turned(settings, 1.0);
-        if turned == settings {
-            sign = -1.0;
-            turned = knob.turned(settings, -1.0);
+        knobs: &[Knob],
+    ) -> Option<Vec<Vec<f32>>> {
+        let turned = |knob: &Knob| {
+            let up = knob.turned(settings, 1.0);
+            if up == settings {
+                (-1.0, knob.turned(settings, -1.0))
+            } else {
+                (1.0, up)
+            }
+        };
+        let sides: Vec<(f32, Vec<Setting>)> = knobs.iter().map(turned).collect();
+        let worlds: Vec<World<'a>> = (sides.iter())
+            .map(|(_, side)| self.world(side, world.run()).ok())
+            .collect::<Option<_>>()?;
+        let others = (worlds.iter().zip(knobs))
+            .map(|(other, knob)| {
+                let forecast = Forecast::compared(other, world).ok()?;
+                Some((forecast, stage_of(&settings[knob.setting])))
+            })
+            .collect::<Option<Vec<_>>>()?;
+        let mut found = columns(others, trace);
+        for (column, (sign, _)) in found.iter_mut().zip(&sides) {
+            column.iter_mut().for_each(|c| *c *= sign);
         }
-        let other = self.world(&turned, run).ok()?;
-        let mut forecast = Forecast::compared(&other, world).ok()?;
-        let mut change = column(&mut forecast, stage_of(&settings[knob.setting]), trace);
-        change.iter_mut().for_each(|c| *c *= sign);
-        Some(change)
+        Some(found)
     }
 }

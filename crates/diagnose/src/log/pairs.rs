@@ -2,12 +2,12 @@
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
-use sim::{Forecast, Setting, World};
+use sim::{Error, Setting, World};
 
-use super::catalogue::{Variant, stage_of};
-use super::columns::column;
+use super::catalogue::Variant;
+use super::columns::columns_of;
 use super::filter::Trace;
-use super::screen::{Normal, normal_of, solve};
+use super::screen::{Normal, TOGETHER, normal_of, solve};
 
 /// Two variants with the settings that linear algebra gives them and the log-likelihood they gain.
 #[derive(Debug, Clone)]
@@ -17,13 +17,16 @@ pub(crate) struct Pair {
 }
 
 /// The best pairs among the given variants.
+///
+/// # Errors
+/// A variant out of its range.
 pub(crate) fn pairs(
     runs: &[(World<'_>, Trace)],
     variants: &[Variant],
     of: &[usize],
     most: usize,
-) -> Vec<Pair> {
-    let (sum, ranges) = gram(runs, variants, of);
+) -> Result<Vec<Pair>, Error> {
+    let (sum, ranges) = gram(runs, variants, of)?;
     let mut found: Vec<Pair> = Vec::new();
     for i in 0..of.len() {
         for j in 0..i {
@@ -43,7 +46,7 @@ pub(crate) fn pairs(
         }
     }
     found.sort_by(|a, b| b.gain.total_cmp(&a.gain));
-    diverse(found, variants, most)
+    Ok(diverse(found, variants, most))
 }
 
 /// The best pairs of different names.
@@ -63,7 +66,7 @@ fn gram(
     runs: &[(World<'_>, Trace)],
     variants: &[Variant],
     of: &[usize],
-) -> (Normal, Vec<std::ops::Range<usize>>) {
+) -> Result<(Normal, Vec<std::ops::Range<usize>>), Error> {
     let settings: Vec<Vec<Setting>> = of.iter().map(|&i| variants[i].settings()).collect();
     let mut ranges = Vec::new();
     let mut count = 0;
@@ -74,23 +77,18 @@ fn gram(
     let flat: Vec<&Setting> = settings.iter().flatten().collect();
     let normals: Vec<Normal> = (runs.iter())
         .map(|(world, trace)| {
-            let columns: Vec<Vec<f32>> = flat
-                .par_iter()
-                .map(
-                    |&setting| match Forecast::beside(world, std::slice::from_ref(setting)) {
-                        Ok(mut forecast) => column(&mut forecast, stage_of(setting), trace),
-                        Err(_) => vec![0.0; trace.instants.len() * super::filter::MEASURED],
-                    },
-                )
-                .collect();
-            normal_of(trace, &columns)
+            let of_some = |some: &[&Setting]| columns_of(some.iter().copied(), world, trace);
+            let columns: Vec<Vec<Vec<f32>>> = (flat.par_chunks(TOGETHER))
+                .map(of_some)
+                .collect::<Result<_, Error>>()?;
+            Ok(normal_of(trace, &columns.concat()))
         })
-        .collect();
+        .collect::<Result<_, Error>>()?;
     let zero = normal_of(&Trace::default(), &vec![Vec::new(); count]);
     let total = normals.into_iter().fold(zero, |a, b| Normal {
         right: a.right + b.right,
         left: a.left + b.left,
         ..a
     });
-    (total, ranges)
+    Ok((total, ranges))
 }

@@ -2,10 +2,10 @@
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
-use sim::{Error, Forecast, World};
+use sim::{Error, Setting, World};
 
-use super::catalogue::{Variant, stage_of};
-use super::columns::column;
+use super::catalogue::Variant;
+use super::columns::columns_of;
 use super::filter::{MEASURED, Trace};
 
 /// Normal equations of a variant's columns against the innovations, of one run.
@@ -20,22 +20,32 @@ pub(crate) struct Normal {
     pub(crate) left_time: DMatrix<f64>,
 }
 
+/// Variants whose columns are taken in one pass over a trace.
+pub(crate) const TOGETHER: usize = 8;
+
 /// The normal equations of every variant (outer) in every run (inner).
 pub(crate) fn normals(runs: &[(World<'_>, Trace)], variants: &[Variant]) -> Result<Vec<Vec<Normal>>, Error> {
-    variants
-        .par_iter()
-        .map(|variant| runs.iter().map(|run| normal(run, variant)).collect())
-        .collect()
+    let of_some = |some: &[Variant]| -> Result<Vec<Vec<Normal>>, Error> {
+        let by_run = (runs.iter())
+            .map(|run| normals_of_run(run, some))
+            .collect::<Result<Vec<_>, _>>()?;
+        let of_variant = |i: usize| by_run.iter().map(|normals| normals[i].clone()).collect();
+        Ok((0..some.len()).map(of_variant).collect())
+    };
+    let parts: Vec<Vec<Vec<Normal>>> = (variants.par_chunks(TOGETHER))
+        .map(of_some)
+        .collect::<Result<_, _>>()?;
+    Ok(parts.concat())
 }
 
-fn normal((world, trace): &(World<'_>, Trace), variant: &Variant) -> Result<Normal, Error> {
-    let columns = (variant.settings().into_iter())
-        .map(|setting| {
-            let stage = stage_of(&setting);
-            Ok(column(&mut Forecast::beside(world, &[setting])?, stage, trace))
-        })
-        .collect::<Result<Vec<_>, Error>>()?;
-    Ok(normal_of(trace, &columns))
+fn normals_of_run((world, trace): &(World<'_>, Trace), variants: &[Variant]) -> Result<Vec<Normal>, Error> {
+    let settings: Vec<Vec<Setting>> = variants.iter().map(Variant::settings).collect();
+    let mut found = columns_of(settings.iter().flatten(), world, trace)?.into_iter();
+    let normal = |own: &Vec<Setting>| {
+        let columns: Vec<Vec<f32>> = found.by_ref().take(own.len()).collect();
+        normal_of(trace, &columns)
+    };
+    Ok(settings.iter().map(normal).collect())
 }
 
 /// Normal equations of columns.
