@@ -107,7 +107,9 @@ impl Atlas {
 /// Every explanation that was tried to the end, the answer first.
 fn explain(search: &Search<'_>, screened: &[Screened]) -> Vec<Found> {
     let mut found = search.singles(screened);
-    if !first_is(&found, |best| suffices(best) || best.share > MOST) {
+    // Of an effect that jumps a descent finds the nearest good size, not the best.
+    let jumps = found.first().is_some_and(|best| search.jumps(best));
+    if !first_is(&found, |best| suffices(best) || best.share > MOST && !jumps) {
         found.extend(search.scans());
         sort(&mut found);
     }
@@ -124,7 +126,7 @@ fn explain(search: &Search<'_>, screened: &[Screened]) -> Vec<Found> {
     found
 }
 
-fn first_is(found: &[Found], holds: fn(&Explanation) -> bool) -> bool {
+fn first_is(found: &[Found], holds: impl Fn(&Explanation) -> bool) -> bool {
     found.first().is_some_and(|best| holds(&best.explanation))
 }
 

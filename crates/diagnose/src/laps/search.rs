@@ -61,6 +61,12 @@ impl Search<'_> {
         combs.filter_map(|probe| self.scan(probe)).collect()
     }
 
+    /// Whether an explanation has an effect whose action jumps with its size.
+    pub(super) fn jumps(&self, found: &Found) -> bool {
+        let parts = &found.hypothesis.parts;
+        parts.iter().any(|part| self.atlas.probes[part.probe].jumps)
+    }
+
     fn scan(&self, probe: usize) -> Option<Found> {
         let found = self.atlas.hunt(self.simulate, self.data, probe)?;
         let refined = self.atlas.settle(self.simulate, self.data, &found)?;
