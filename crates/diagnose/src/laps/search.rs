@@ -69,8 +69,8 @@ impl Search<'_> {
 
     fn scan(&self, probe: usize) -> Option<Found> {
         let found = self.atlas.hunt(self.simulate, self.data, probe)?;
-        let refined = self.atlas.settle(self.simulate, self.data, &found)?;
-        Some(self.found(&refined.refined))
+        let settled = self.atlas.settle(self.simulate, self.data, &found)?;
+        Some(self.found(&settled.refined))
     }
 
     /// The best pairs, tried to the end.
