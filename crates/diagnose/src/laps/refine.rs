@@ -123,12 +123,15 @@ impl Atlas {
         descent: Descent,
         round: Round,
     ) -> Option<Descent> {
-        match (round, &descent.near) {
-            _ if descent.found => Some(descent),
+        if descent.found {
+            return Some(descent);
+        }
+        let round = match round {
             // A place is not found on one parabola.
-            (Round::Again, _) if descent.hypothesis.has_place(self) => {
-                self.look_around(simulate, data, descent, Round::Rough)
-            }
+            Round::Again if descent.hypothesis.has_place(self) => Round::Rough,
+            round => round,
+        };
+        match (round, &descent.near) {
             (Round::Again, Some(_)) => self.look_again(simulate, data, descent),
             _ => self.look_around(simulate, data, descent, round),
         }

@@ -63,16 +63,14 @@ impl Atlas {
             .collect()
     }
 
+    /// The mean of data sets simulated with these settings, without the control variate of [`Atlas::evaluate`].
     pub(super) fn simulated_plainly(
         &self,
         simulate: &Simulate<'_>,
         settings: &[Setting],
         sets: u64,
     ) -> Option<Expectation> {
-        self.spent.add(sets);
-        let summaries: Vec<Summary> = (0..sets)
-            .map(|set| self.summary(simulate, settings, set))
-            .collect::<Option<_>>()?;
+        let summaries = self.summaries(simulate, settings, 0..sets)?;
         Some(Expectation::of(summaries.iter(), true))
     }
 
@@ -88,6 +86,7 @@ impl Atlas {
         Some(self.fit(data, &end)?.residual)
     }
 
+    /// A hypothesis simulated; `None` where the robot crashes.
     pub(super) fn evaluate(
         &self,
         simulate: &Simulate<'_>,
@@ -97,6 +96,7 @@ impl Atlas {
         self.simulated(simulate, &hypothesis.settings(self), hypothesis.alike(), sets)
     }
 
+    /// The same with data sets added until there are so many.
     pub(super) fn evaluate_more(
         &self,
         simulate: &Simulate<'_>,
