@@ -143,14 +143,16 @@ impl Answer {
         self.claimed().map(Explanation::settings).unwrap_or_default()
     }
 
-    /// This answer, unless it is a slower wheel and more slip whose sizes follow from one another, as they do if wheels
-    /// stand still in a share of the physics steps: one cause without a name, then, rather than two with theirs.
-    /// `slip_level` is the declared model's.
+    /// This answer, unless it, or another that the data do not tell from it, is a slower wheel and more slip whose sizes
+    /// follow from one another, as they do if wheels stand still in a share of the physics steps: one cause without a name,
+    /// then, rather than two with theirs. `slip_level` is the declared model's.
     #[must_use]
     pub fn unless_stalls(mut self, slip_level: f64) -> Self {
-        if self
-            .claimed()
-            .is_some_and(|claimed| are_stalls(claimed, slip_level))
+        let alike = &self.explanations[..self.indistinguishable];
+        if self.claimed().is_some()
+            && alike
+                .iter()
+                .any(|explanation| are_stalls(explanation, slip_level))
         {
             self.verdict = Verdict::Unexplained;
             self.cause = Some(Cause {
@@ -228,6 +230,16 @@ mod tests {
         let doubted = answer(0.9, slip).unless_stalls(0.1);
         assert_eq!(doubted.verdict, Verdict::Unexplained);
         assert_eq!(doubted.cause.unwrap().depends_on, "chance");
+    }
+
+    #[test]
+    fn it_is_enough_that_the_data_do_not_tell_it_from_the_answer() {
+        let slip = ((0.09_f64 + 0.003) / (0.01 / 3.0)).sqrt() / 0.9;
+        let mut doubted = answer(0.9, 1.5 * slip);
+        doubted.explanations.extend(answer(0.9, slip).explanations);
+        assert_eq!(doubted.clone().unless_stalls(0.1).verdict, Verdict::Explained);
+        doubted.indistinguishable = 2;
+        assert_eq!(doubted.unless_stalls(0.1).verdict, Verdict::Unexplained);
     }
 
     #[test]

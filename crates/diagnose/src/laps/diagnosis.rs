@@ -3,17 +3,17 @@
 use sim::{Setting, UNLISTED};
 
 use super::atlas::{Atlas, Simulate};
-use super::screen::{FAULTS, Screened};
+use super::screen::Screened;
 use super::search::{Found, Search, sort};
-use super::tests_of_fit::FourNumbers;
+use super::tests_of_fit::{FourNumbers, SIGNIFICANT_P};
 use crate::{Answer, Cause, Error, Explanation, Verdict};
 
 /// Score of the best probe from which a data set counts as departing from the declared model, whatever the omnibus says.
 pub(super) const ALARM_SCORE: f64 = 7.0;
 /// Omnibus probability below which it does.
 const ALARM_P: f64 = 0.002;
-/// Probability of the fit below which a remainder is significant.
-const SIGNIFICANT_P: f64 = 0.001;
+/// Probability of what is left below which something is left that is worth a search, however small a share it is.
+const SURELY_P: f64 = 1e-6;
 /// Share of the excess that an explanation must explain to stand in spite of a significant remainder.
 const ENOUGH: f64 = 0.98;
 /// The same for several effects, which have more freedom to be wrong.
@@ -26,6 +26,9 @@ const AS_GOOD: f64 = 0.01;
 const ALTERNATIVE: f64 = 5.0;
 /// Log-likelihood that each number of a further effect must gain.
 const WORTH: f64 = 10.0;
+/// Share of what is explained already that further effects which do not fit either must gain: at very high signal no model is
+/// exact.
+const FAULTS: f64 = 0.001;
 
 /// Whether an explanation leaves nothing significant.
 fn fits(explanation: &Explanation) -> bool {
@@ -39,7 +42,7 @@ fn suffices(explanation: &Explanation) -> bool {
     } else {
         ENOUGH
     };
-    fits(explanation) || explanation.share >= enough
+    fits(explanation) || explanation.share >= enough && explanation.remainder_p >= SURELY_P
 }
 
 /// What laps tell about a model.
@@ -114,10 +117,17 @@ fn explain(search: &Search<'_>, screened: &[Screened]) -> Vec<Found> {
         sort(&mut found);
     }
     if !first_is(&found, fits) {
-        found = preferred(found, search.pairs());
+        found.extend(search.patterns(&found));
+        sort(&mut found);
     }
-    if !first_is(&found, suffices) {
-        let further = search.further(&found);
+    if !first_is(&found, fits) {
+        let pairs = search.pairs(&found);
+        found = preferred(found, pairs);
+    }
+    if let Some(best) = found.first().filter(|best| best.explanation.effects.len() > 1)
+        && !suffices(&best.explanation)
+    {
+        let further = search.further(best);
         found = preferred(found, further);
     }
     if !first_is(&found, suffices) {
@@ -172,20 +182,27 @@ fn preferred(fewer: Vec<Found>, more: Vec<Found>) -> Vec<Found> {
     let (a, b) = (&first.explanation, &further.explanation);
     let numbers = count(further).saturating_sub(count(first)).max(1) as f64;
     let better = fits(b) || b.share >= ALL_BUT || !suffices(a) && b.share > a.share;
-    let wins = b.gain - a.gain > (WORTH * numbers).max(FAULTS * a.gain) && better && !heaps_noise(b);
+    let faults = if fits(b) { 0.0 } else { FAULTS * a.gain };
+    let wins = b.gain - a.gain > (WORTH * numbers).max(faults) && better && !heaps_noise(b);
     let (mut list, rest) = if wins { (more, fewer) } else { (fewer, more) };
     list.extend(rest);
     list
 }
 
-/// A cause without a name comes before names that explain no more than it. Where causes in different stages explain the
-/// same, none is claimed.
+/// A cause without a name comes before names that explain no more than it, or less if they explain nearly all.
 fn unless_named(named: Vec<Found>, unnamed: Vec<Found>) -> Vec<Found> {
     let Some(best) = unnamed.first() else {
         return named;
     };
-    let share = named.first().map_or(0.0, |first| first.explanation.share);
-    let wins = suffices(&best.explanation) || best.explanation.share > share - AS_GOOD;
+    let wins = suffices(&best.explanation)
+        || named.first().is_none_or(|first| {
+            let (a, b) = (&first.explanation, &best.explanation);
+            if a.share >= ENOUGH {
+                b.score > a.score + WORTH
+            } else {
+                b.share > a.share - AS_GOOD
+            }
+        });
     let (mut list, rest) = if wins { (unnamed, named) } else { (named, unnamed) };
     list.extend(rest);
     list

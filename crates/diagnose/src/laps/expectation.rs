@@ -194,6 +194,34 @@ impl Scatter {
         )
     }
 
+    /// The scatter of the laps of these recordings drawn towards this one, as far as chance explains the difference.
+    pub(super) fn unless_apart<'a>(
+        &self,
+        recordings: impl Iterator<Item = &'a Recording> + Clone,
+    ) -> Option<Self> {
+        let (own, freedom) = pooled(recordings, self.open.nrows());
+        let size = own.nrows();
+        let common = self.of_lap();
+        let root = common.clone().cholesky()?;
+        let mut apart = &own - &common;
+        root.l_dirty().solve_lower_triangular_mut(&mut apart);
+        apart.transpose_mut();
+        root.l_dirty().solve_lower_triangular_mut(&mut apart);
+        let by_chance = (size * (size + 1)) as f64 / freedom;
+        let share = (by_chance / apart.norm_squared()).min(1.0);
+        if share == 1.0 {
+            return Some(self.clone());
+        }
+        let freedom = ((1.0 - share).powi(2) / freedom + share.powi(2) / self.freedom).recip();
+        Self::with(
+            own * (1.0 - share) + common * share,
+            freedom,
+            self.second.clone(),
+            self.open.clone(),
+            self.axes.clone(),
+        )
+    }
+
     /// This scatter where the declaration leaves the mean lap open: `directions` are as likely as not, in units of a lap;
     /// runs have `laps` laps.
     pub(super) fn left_open(self, directions: &[DVector<f64>], laps: f64) -> Option<Self> {
@@ -364,6 +392,23 @@ mod tests {
             // 30 +- 1.2 by chance.
             assert!((squares - 30.0).abs() < 3.6, "{smooth}: {squares}");
             assert!(off.abs() < 1.0, "{smooth}: {off}");
+        }
+    }
+
+    #[test]
+    fn rivals_share_a_scatter_unless_theirs_differ_by_more_than_chance() {
+        let declared = covariance(4.0);
+        let axes = axes(&declared);
+        let second = DMatrix::identity(SECOND, SECOND).cholesky().unwrap();
+        let common = Scatter::with(declared, 1e4, second, DMatrix::zeros(SIZE, SIZE), axes).unwrap();
+        let mut stream = Streams { seed: 6, run: 0 }.open("laps");
+        for (smooth, kept) in [(4.0, 0.1), (8.0, 0.8)] {
+            let truth = covariance(smooth).cholesky().unwrap();
+            let laps = recording(&truth.l(), 1000, &mut stream);
+            let scatter = common.unless_apart(std::iter::once(&laps)).unwrap();
+            let (own, of_lap) = (&laps.scatter / 1000.0, scatter.of_lap());
+            let moved = (&of_lap - common.of_lap()).norm() / (own - common.of_lap()).norm();
+            assert_eq!(moved > kept, smooth > 4.0, "{smooth}: {moved}");
         }
     }
 }

@@ -202,6 +202,38 @@ impl Hypothesis {
         self.parts.iter().all(|part| part.shape != Shape::ByRun)
     }
 
+    /// A single constant effect with a size that goes over the runs or in time, from the same size; `None` for others.
+    pub(super) fn over(&self, shape: Shape, atlas: &Atlas) -> Option<Self> {
+        let [part] = self.parts.as_slice() else {
+            return None;
+        };
+        let probe = &atlas.probes[part.probe];
+        let runs = if shape == Shape::ByRun {
+            atlas.layout.runs()
+        } else {
+            1
+        };
+        let can = match shape {
+            Shape::Constant => false,
+            Shape::ByRun => runs > 1,
+            Shape::ByTime => !probe.drifts(),
+        };
+        (can && part.shape == Shape::Constant).then(|| Self {
+            parts: vec![Part {
+                shape,
+                values: vec![part.values[0].clone(); runs],
+                ..part.clone()
+            }],
+        })
+    }
+
+    /// Its probes, in order.
+    pub(super) fn probes(&self) -> Vec<usize> {
+        let mut probes: Vec<usize> = self.parts.iter().map(|part| part.probe).collect();
+        probes.sort_unstable();
+        probes
+    }
+
     /// This hypothesis and another together.
     pub(super) fn with(&self, other: &Self) -> Self {
         Self {
@@ -224,11 +256,13 @@ impl Hypothesis {
 
     /// What counts of a gain in log-likelihood.
     pub(super) fn worth(&self, gain: f64) -> f64 {
+        /// Share of a gain that faults of the simulation may take.
+        const FAULTS: f64 = 0.001;
         self.parts
             .iter()
             .map(|part| part.shape)
             .find(|shape| *shape != Shape::Constant)
-            .map_or(gain, |shape| worth(gain, shape))
+            .map_or(gain, |shape| worth(gain, shape, FAULTS))
     }
 
     /// The numbers that a fit may change.

@@ -29,8 +29,13 @@ impl Atlas {
     /// How well a simulated hypothesis explains the data; `None` if it was simulated too seldom to know its scatter.
     pub(super) fn fit(&self, data: &Expectation, simulated: &Evaluated) -> Option<Fit> {
         let scatter = self.scatter_of(simulated.summaries.iter())?;
-        let residual = white(&scatter, &self.layout, data, &simulated.expectation);
-        Some(self.fit_of(data, residual, &scatter, simulated.doubt))
+        Some(self.fit_in(data, simulated, &scatter))
+    }
+
+    /// How well a simulated hypothesis with a known scatter explains the data.
+    pub(super) fn fit_in(&self, data: &Expectation, simulated: &Evaluated, scatter: &[Scatter]) -> Fit {
+        let residual = white(scatter, &self.layout, data, &simulated.expectation);
+        self.fit_of(data, residual, scatter, simulated.doubt)
     }
 
     /// The fit that leaves a residual in units of the hypothesis' own scatter.
@@ -96,6 +101,19 @@ impl Atlas {
             }
         }
         (widened, doubtful)
+    }
+
+    /// The scatter of each of several simulated hypotheses that explain data about as well: the same for all but for what
+    /// chance does not explain. `None` if they were simulated too seldom.
+    pub(super) fn scatters_of(&self, rivals: &[Evaluated]) -> Option<Vec<Vec<Scatter>>> {
+        let common = self.scatter_of(rivals.iter().flat_map(|rival| &rival.summaries))?;
+        let of = |rival: &Evaluated| {
+            let own = |(g, common): (usize, &Scatter)| {
+                common.unless_apart(rival.summaries.iter().map(move |summary| &summary.0[g]))
+            };
+            common.iter().enumerate().map(own).collect()
+        };
+        rivals.iter().map(of).collect()
     }
 
     /// The scatter of simulated data sets, recording by recording.

@@ -307,7 +307,12 @@ pub(super) fn probes() -> Vec<Probe> {
         mirrored(vector("camera-offset", ["dx_m", "dy_m"], &[0.002])),
         mirrored(line("camera-rotation", &[0.008])),
         mirrored(line("camera-distortion", &[0.01])),
-        mirrored(vector("marker-offset", ["forward_m", "left_m"], &[0.003])),
+        // The farther ahead a marker, the more it cuts corners: no mirror image of one behind.
+        vector(
+            "marker-offset",
+            ["forward_m", "left_m"],
+            &[-0.012, -0.003, 0.003, 0.012],
+        ),
         line("camera-noise", &[0.4, 0.75, 1.4, 2.0, 3.0]),
         groups(),
     ]

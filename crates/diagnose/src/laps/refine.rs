@@ -1,6 +1,7 @@
 //! The size of a hypothesis by simulation, and how well it then explains the data.
 
 use nalgebra::DVector;
+use rayon::prelude::*;
 use sim::Setting;
 
 use super::atlas::{Atlas, Simulate, white};
@@ -54,7 +55,7 @@ pub(super) struct Refined {
 /// A hypothesis at its most likely sizes with what was simulated to judge it.
 pub(super) struct Settled {
     pub(super) refined: Refined,
-    evaluated: Evaluated,
+    pub(super) evaluated: Evaluated,
 }
 
 impl Refined {
@@ -280,30 +281,41 @@ impl Atlas {
     ) -> Option<Settled> {
         let hypothesis = self.quantised(found.hypothesis.clone());
         let end = self.evaluate(simulate, &hypothesis, self.enough(END_SETS, 1))?;
-        self.settled(data, hypothesis, found.errors(), end)
+        let fit = self.fit(data, &end)?;
+        Some(self.settled(hypothesis, found.errors(), fit, end))
     }
 
-    /// The same hypothesis simulated more often.
-    pub(super) fn settle_more(
+    /// Hypotheses that explain the data about as well simulated more often, and told apart by what they do to the mean:
+    /// by the scatter only as far as theirs differ by more than chance.
+    pub(super) fn settle_rivals(
         &self,
         simulate: &Simulate<'_>,
         data: &Expectation,
-        settled: Settled,
+        rivals: Vec<Settled>,
         sets: u64,
-    ) -> Option<Settled> {
-        let Settled { refined, evaluated } = settled;
-        let more = self.evaluate_more(simulate, &refined.hypothesis, evaluated, sets)?;
-        self.settled(data, refined.hypothesis, refined.errors, more)
+    ) -> Vec<Settled> {
+        let (refined, evaluated): (Vec<Refined>, Vec<Evaluated>) = (rivals.into_par_iter())
+            .filter_map(|Settled { refined, evaluated }| {
+                let more = self.evaluate_more(simulate, &refined.hypothesis, evaluated, sets)?;
+                Some((refined, more))
+            })
+            .unzip();
+        let scatters = self.scatters_of(&evaluated).unwrap_or_default();
+        (refined.into_iter().zip(evaluated).zip(scatters))
+            .map(|((refined, evaluated), scatter)| {
+                let fit = self.fit_in(data, &evaluated, &scatter);
+                self.settled(refined.hypothesis, refined.errors, fit, evaluated)
+            })
+            .collect()
     }
 
     fn settled(
         &self,
-        data: &Expectation,
         hypothesis: Hypothesis,
         errors: Vec<(Freedom, f64)>,
+        fit: Fit,
         evaluated: Evaluated,
-    ) -> Option<Settled> {
-        let fit = self.fit(data, &evaluated)?;
+    ) -> Settled {
         let score = hypothesis.worth(fit.gain) - self.price_of(&hypothesis);
         let refined = Refined {
             hypothesis,
@@ -311,7 +323,7 @@ impl Atlas {
             fit,
             score,
         };
-        Some(Settled { refined, evaluated })
+        Settled { refined, evaluated }
     }
 
     /// What a hypothesis pays for its fitted numbers and for the choice of its probes.

@@ -140,7 +140,8 @@ impl Atlas {
             }
         };
         let gain = residual.norm_squared() - (residual - &action).norm_squared();
-        let score = worth(0.5 * gain, shape) - price(fitted, self.layout.total_laps()) - self.choice(probe);
+        let score =
+            worth(0.5 * gain, shape, FAULTS) - price(fitted, self.layout.total_laps()) - self.choice(probe);
         Some(Screened {
             hypothesis: Hypothesis {
                 parts: vec![Part::screened(self, probe, shape, &size_at)],
@@ -150,19 +151,19 @@ impl Atlas {
     }
 }
 
-/// Share of a gain that faults of a model may take: at very high signal none is exact.
-pub(super) const FAULTS: f64 = 0.01;
+/// Share of a gain that faults of the paths may take: they are straight between few sizes.
+const FAULTS: f64 = 0.01;
 
 /// Share of its last piece by which a path is trusted to go on straight.
 pub(super) const BEYOND: f64 = 0.7;
 
-/// What counts of a gain: at very high signal no model is exact, and sizes that may go over the runs follow its faults.
-pub(super) fn worth(gain: f64, shape: Shape) -> f64 {
+/// What counts of a gain of which faults may take a share: sizes that may go over the runs follow them.
+pub(super) fn worth(gain: f64, shape: Shape, faults: f64) -> f64 {
     /// What a pattern has to gain beside its numbers.
     const PATTERN: f64 = 4.0;
     match shape {
         Shape::Constant => gain,
-        Shape::ByRun | Shape::ByTime => (1.0 - FAULTS) * gain - PATTERN,
+        Shape::ByRun | Shape::ByTime => (1.0 - faults) * gain - PATTERN,
     }
 }
 

@@ -5,11 +5,11 @@ use rayon::prelude::*;
 
 use super::atlas::{Atlas, Simulate, White};
 use super::expectation::Expectation;
-use super::hypothesis::{Hypothesis, Part};
-use super::refine::{CLOSE_SETS, Descent, Refined, Round, Settled};
+use super::hypothesis::{Hypothesis, Part, Shape};
+use super::refine::{CLOSE_SETS, Descent, Round, Settled};
 use super::screen::Screened;
 use super::simulated::FINAL_SETS;
-use super::tests_of_fit::FourNumbers;
+use super::tests_of_fit::{FourNumbers, SIGNIFICANT_P};
 use crate::{Candidate, Explanation};
 
 /// An explanation and what simulates it.
@@ -19,6 +19,8 @@ pub(super) struct Found {
     pub(super) explanation: Explanation,
     /// Standard deviation of its log-likelihood for the simulation's own error.
     pub(super) gain_error: f64,
+    /// What it leaves of the data, in units of the declared model's scatter.
+    left: White,
 }
 
 /// A search for explanations of one data set.
@@ -40,10 +42,12 @@ const ROUNDS: [(Round, f64, f64); 5] = [
 ];
 
 /// The same for several effects together.
-const ROUNDS_OF_SEVERAL: [(Round, f64, f64); 3] = [
+const ROUNDS_OF_SEVERAL: [(Round, f64, f64); 5] = [
     (Round::Rough, 50.0, 0.1),
     (Round::Again, 30.0, 0.03),
-    (Round::Full, 15.0, 0.01),
+    (Round::Full, 20.0, 0.01),
+    (Round::Full, 15.0, 0.004),
+    (Round::Full, 15.0, 0.004),
 ];
 
 /// The same for hypotheses of many numbers that are linear in what they do.
@@ -70,34 +74,56 @@ impl Search<'_> {
     fn scan(&self, probe: usize) -> Option<Found> {
         let found = self.atlas.hunt(self.simulate, self.data, probe)?;
         let settled = self.atlas.settle(self.simulate, self.data, &found)?;
-        Some(self.found(&settled.refined))
+        Some(self.found(&settled))
     }
 
-    /// The best pairs, tried to the end.
-    pub(super) fn pairs(&self) -> Vec<Found> {
-        const PAIRS: usize = 8;
-        let pairs = self.atlas.screen_pairs(self.residual, PAIRS);
-        self.try_rounds(pairs.iter().map(|pair| &pair.hypothesis), &ROUNDS_OF_SEVERAL)
-    }
-
-    /// The best explanations with what explains their remainder best beside them, tried to the end.
-    pub(super) fn further(&self, best: &[Found]) -> Vec<Found> {
-        const STARTS: usize = 1;
-        const FURTHER: usize = 3;
-        let starts = best.iter().take(STARTS).flat_map(|start| {
-            let left = self.atlas.left_by(self.simulate, self.data, &start.hypothesis);
-            let screened = left.map(|left| self.atlas.screen(&left)).unwrap_or_default();
-            let others = self
-                .shortlist(&screened)
+    /// The best single effects with sizes that go over the runs or in time, where what they leave does, tried to the end.
+    pub(super) fn patterns(&self, singles: &[Found]) -> Vec<Found> {
+        const STARTS: usize = 3;
+        let goes = |found: &Found| {
+            let left = found.explanation.remainder;
+            let by_run = left.is_some_and(|left| left.runs.p < SIGNIFICANT_P);
+            let by_time = left.is_some_and(|left| left.trend.p < SIGNIFICANT_P);
+            [(Shape::ByRun, by_run), (Shape::ByTime, by_time)]
                 .into_iter()
-                .filter(|s| !self.shares_effect(s, start));
-            others
-                .take(FURTHER)
-                .map(|other| start.hypothesis.with(&other.hypothesis))
+                .filter_map(|(shape, goes)| goes.then(|| found.hypothesis.over(shape, self.atlas)).flatten())
                 .collect::<Vec<_>>()
-        });
-        let starts: Vec<Hypothesis> = starts.collect();
+        };
+        let starts: Vec<Hypothesis> = singles.iter().take(STARTS).flat_map(goes).collect();
         self.try_rounds(starts.iter(), &ROUNDS_OF_SEVERAL)
+    }
+
+    /// The best pairs, tried to the end: those that together explain most as far as actions add up, and the best single
+    /// effects with what explains their remainder best.
+    pub(super) fn pairs(&self, singles: &[Found]) -> Vec<Found> {
+        const PAIRS: usize = 8;
+        let screened = self.atlas.screen_pairs(self.residual, PAIRS);
+        let mut starts: Vec<Hypothesis> = screened.into_iter().map(|pair| pair.hypothesis).collect();
+        for single in singles.iter().take(2) {
+            for start in self.beside(single) {
+                if !starts.iter().any(|other| other.probes() == start.probes()) {
+                    starts.push(start);
+                }
+            }
+        }
+        self.try_rounds(starts.iter(), &ROUNDS_OF_SEVERAL)
+    }
+
+    /// The best explanation with what explains its remainder best beside it, tried to the end.
+    pub(super) fn further(&self, best: &Found) -> Vec<Found> {
+        self.try_rounds(self.beside(best).iter(), &ROUNDS_OF_SEVERAL)
+    }
+
+    /// An explanation with each of the effects that explain its remainder best.
+    fn beside(&self, start: &Found) -> Vec<Hypothesis> {
+        const FURTHER: usize = 3;
+        let screened = self.atlas.screen(&start.left);
+        let others = self.shortlist(&screened).into_iter();
+        others
+            .filter(|screened| !self.shares_effect(screened, start))
+            .take(FURTHER)
+            .map(|other| start.hypothesis.with(&other.hypothesis))
+            .collect()
     }
 
     /// The screened hypotheses worth a simulation: each probe in its best pattern, of one effect the best two. What acts at
@@ -165,7 +191,7 @@ impl Search<'_> {
             .filter_map(|descent| self.atlas.settle(self.simulate, self.data, descent))
             .collect();
         let mut found: Vec<Found> = (self.closer(settled).iter())
-            .map(|settled| self.found(&settled.refined))
+            .map(|settled| self.found(settled))
             .collect();
         sort(&mut found);
         found
@@ -178,13 +204,12 @@ impl Search<'_> {
         let (close, mut others): (Vec<_>, Vec<_>) =
             (settled.into_iter()).partition(|s| s.refined.score > best - CLOSE);
         let sets = if close.len() > 1 { CLOSE_SETS } else { FINAL_SETS };
-        let more = (close.into_par_iter())
-            .filter_map(|settled| self.atlas.settle_more(self.simulate, self.data, settled, sets));
-        others.extend(more.collect::<Vec<_>>());
+        others.extend(self.atlas.settle_rivals(self.simulate, self.data, close, sets));
         others
     }
 
-    fn found(&self, refined: &Refined) -> Found {
+    fn found(&self, settled: &Settled) -> Found {
+        let Settled { refined, evaluated } = settled;
         let atlas = self.atlas;
         let settings = refined.hypothesis.settings(atlas);
         let mut effects: Vec<(f64, Candidate)> = (settings.into_iter().enumerate())
@@ -205,6 +230,7 @@ impl Search<'_> {
         let remainder = FourNumbers::new(&refined.fit.residual, &atlas.layout);
         Found {
             gain_error: refined.fit.gain_error,
+            left: atlas.white(self.data, &evaluated.expectation),
             hypothesis: refined.hypothesis.clone(),
             explanation: Explanation {
                 effects: effects.into_iter().map(|(_, candidate)| candidate).collect(),

@@ -34,17 +34,6 @@ impl Atlas {
         sets.max(needed.div_ceil(points)).min(self.samples.len() as u64)
     }
 
-    /// What a hypothesis leaves of the data, in units of the declared model's scatter; `None` where the robot crashes.
-    pub(super) fn left_by(
-        &self,
-        simulate: &Simulate<'_>,
-        data: &Expectation,
-        hypothesis: &Hypothesis,
-    ) -> Option<White> {
-        let evaluated = self.evaluate(simulate, hypothesis, self.enough(FINAL_SETS, 1))?;
-        Some(self.white(data, &evaluated.expectation))
-    }
-
     /// What one step of each of these numbers of probes does, by the same draws; `None` where the robot crashes.
     pub(super) fn actions(
         &self,

@@ -6,6 +6,9 @@ use super::atlas::{NULL_SETS, White};
 use super::layout::Layout;
 use super::summary::SECOND;
 
+/// Probability of what is left below which it is significant.
+pub(super) const SIGNIFICANT_P: f64 = 0.001;
+
 /// A sum of squares with its probability under the expectation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Quadratic {
