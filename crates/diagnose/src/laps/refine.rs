@@ -11,6 +11,7 @@ use super::likelihood::Fit;
 use super::parabola::{Column, Local, left_of, nearest};
 use super::screen::price;
 use super::simulated::Evaluated;
+use super::tests_of_fit::FourNumbers;
 use crate::Error;
 
 /// What is simulated in a round of a descent.
@@ -73,6 +74,8 @@ pub(super) struct Descent {
     errors: Vec<f64>,
     /// Log-likelihood gained over the declared model less the price of the fitted numbers, as the last round saw it.
     pub(super) score: f64,
+    /// What it leaves, as the last full round saw it.
+    pub(super) remainder: Option<FourNumbers>,
     /// What the rough round saw, and the moves since.
     near: Option<(Local, DVector<f64>)>,
     /// Whether there is nowhere left to descend to.
@@ -88,6 +91,7 @@ impl Descent {
             errors: vec![f64::INFINITY; freedoms.len()],
             freedoms,
             score: f64::NEG_INFINITY,
+            remainder: None,
             near: None,
             found: false,
         }
@@ -145,8 +149,10 @@ impl Atlas {
         descent: Descent,
         round: Round,
     ) -> Option<Descent> {
-        /// Errors by which a number may still have moved in the last round.
+        /// Errors by which a number may still have moved in the last round, and those by which it may if the points of its
+        /// parabola lie so many times farther out.
         const SETTLED: f64 = 0.7;
+        const WITHIN: (f64, f64) = (3.0, 4.0);
         let Descent {
             hypothesis,
             mut freedoms,
@@ -164,7 +170,11 @@ impl Atlas {
         let left = left_of(&local.columns, &target, &moves);
         let fit = self.fit_of(data, left, &local.scatter, local.doubt);
         let hypothesis = self.with_moves(&hypothesis, &freedoms, &moves);
-        let settled = (0..moves.len()).all(|i| moves[i].abs() < SETTLED * covariance[(i, i)].sqrt());
+        let settled = (0..moves.len()).all(|i| {
+            let (moved, error) = (moves[i].abs(), covariance[(i, i)].sqrt());
+            moved < SETTLED * error || moved < WITHIN.0 * error && WITHIN.1 * moved < freedoms[i].step
+        });
+        let remainder = FourNumbers::new(&fit.residual, &self.layout);
         for (i, freedom) in freedoms.iter_mut().enumerate() {
             errors[i] = (covariance[(i, i)] * (1.0 + local.doubt.error)).sqrt();
             // The parabola should hold where the answer may lie, and be wide enough for the noise of its points not to
@@ -176,6 +186,7 @@ impl Atlas {
             score: hypothesis.worth(fit.gain) - self.price_of(&hypothesis),
             found: round == Round::Full && settled,
             near: Some((local, moves)),
+            remainder: (round == Round::Full).then_some(remainder),
             hypothesis,
             freedoms,
             errors,

@@ -43,9 +43,9 @@ const ROUNDS: [(Round, f64, f64); 5] = [
 
 /// The same for several effects together.
 const ROUNDS_OF_SEVERAL: [(Round, f64, f64); 5] = [
-    (Round::Rough, 50.0, 0.1),
-    (Round::Again, 30.0, 0.03),
-    (Round::Full, 20.0, 0.01),
+    (Round::Rough, 50.0, 0.06),
+    (Round::Again, 30.0, 0.02),
+    (Round::Full, 20.0, 0.006),
     (Round::Full, 15.0, 0.004),
     (Round::Full, 15.0, 0.004),
 ];
@@ -180,12 +180,21 @@ impl Search<'_> {
         let mut alive: Vec<Descent> = hypotheses
             .map(|start| Descent::start(self.atlas, start))
             .collect();
+        let mut before = 0.0;
         for &(round, behind, share) in rounds {
             alive = (alive.into_par_iter())
                 .filter_map(|descent| self.atlas.descend(self.simulate, self.data, descent, round))
                 .collect();
             let best = (alive.iter().map(|d| d.score)).fold(f64::NEG_INFINITY, f64::max);
             alive.retain(|d| d.score >= best - behind.max(share * best));
+            if alive
+                .iter()
+                .filter(|d| d.score == best)
+                .any(|d| is_hopeless(d, best - before))
+            {
+                break;
+            }
+            before = best;
         }
         let settled = (alive.par_iter())
             .filter_map(|descent| self.atlas.settle(self.simulate, self.data, descent))
@@ -243,6 +252,13 @@ impl Search<'_> {
             },
         }
     }
+}
+
+/// Whether the best descent leaves far too much and does not get on: more rounds would not make an answer of it.
+fn is_hopeless(descent: &Descent, progress: f64) -> bool {
+    const P: f64 = 1e-12;
+    const SLOW: f64 = 0.1;
+    (descent.remainder).is_some_and(|left| left.omnibus_p() < P && progress < SLOW * 0.5 * left.excess())
 }
 
 /// Best first.
