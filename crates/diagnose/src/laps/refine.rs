@@ -26,17 +26,14 @@ pub(super) enum Round {
 }
 
 impl Round {
-    /// Data sets at each point: with few numbers to fit, and with many, which have more points.
-    fn sets(self) -> [u64; 2] {
+    /// Data sets at each of so many points: the fewer the more points there are.
+    fn sets(self, points: u64) -> u64 {
         match self {
-            Self::Rough => [4, 3],
-            Self::Again | Self::Full => [10, 6],
+            Self::Rough => (16 / points).clamp(3, 4),
+            Self::Again | Self::Full => (45 / points).clamp(6, 10),
         }
     }
 }
-
-/// Numbers to fit from which there are many.
-const MANY: usize = 5;
 
 /// Data sets simulated of every hypothesis that comes to the end, and of the best and others that explain nearly as much.
 const END_SETS: u64 = 16;
@@ -163,7 +160,7 @@ impl Atlas {
             simulate,
             &hypothesis,
             &freedoms,
-            self.sets_at(&freedoms, round, 3),
+            self.sets_around(&freedoms, round),
         )?;
         let target = white(&local.scatter, &self.layout, data, &local.center);
         let (moves, covariance) = nearest(&local.columns, &target, &freedoms);
@@ -195,7 +192,7 @@ impl Atlas {
 
     fn look_again(&self, simulate: &Simulate<'_>, data: &Expectation, descent: Descent) -> Option<Descent> {
         let (local, moved) = descent.near.as_ref()?;
-        let sets = self.sets_at(&descent.freedoms, Round::Again, 1);
+        let sets = self.enough(Round::Again.sets(1), 1);
         let center = self.evaluate(simulate, &descent.hypothesis, sets)?;
         let columns: Vec<Column> = (local.columns.iter().zip(moved.iter()))
             .map(|(column, moved)| column.from(*moved))
@@ -217,9 +214,10 @@ impl Atlas {
         hypothesis.moved(self, &by)
     }
 
-    /// Data sets at each of so many points of a round.
-    fn sets_at(&self, freedoms: &[Freedom], round: Round, points: u64) -> u64 {
-        self.enough(round.sets()[usize::from(freedoms.len() >= MANY)], points)
+    /// Data sets at each point of a round that looks to both sides of these numbers.
+    fn sets_around(&self, freedoms: &[Freedom], round: Round) -> u64 {
+        let points = 2 * freedoms.len() as u64 + 1;
+        self.enough(round.sets(points), points)
     }
 
     /// For each run the effects with sizes fitted to the other runs alone, by the parabolas about the hypothesis' sizes; a
@@ -235,7 +233,7 @@ impl Atlas {
             simulate,
             hypothesis,
             &freedoms,
-            self.sets_at(&freedoms, Round::Full, 3),
+            self.sets_around(&freedoms, Round::Full),
         );
         let fit_without = |run: usize| {
             let found = match &local {

@@ -53,6 +53,9 @@ const ROUNDS_OF_SEVERAL: [(Round, f64, f64); 5] = [
 /// The same for hypotheses of many numbers that are linear in what they do.
 const ROUNDS_OF_GROUPS: [(Round, f64, f64); 2] = [(Round::Rough, 30.0, 0.05), (Round::Full, 20.0, 0.015)];
 
+/// Probability of what is left below which nothing short of another effect helps.
+const HOPELESS_P: f64 = 1e-12;
+
 impl Search<'_> {
     /// The best single effects, tried to the end, best first.
     pub(super) fn singles(&self, screened: &[Screened]) -> Vec<Found> {
@@ -206,10 +209,19 @@ impl Search<'_> {
         found
     }
 
-    /// Simulates the best hypothesis more often, and still more if others explain nearly as much.
+    /// Simulates the best hypothesis more often, and still more if others explain nearly as much; not if all leave far too
+    /// much.
     fn closer(&self, settled: Vec<Settled>) -> Vec<Settled> {
         const CLOSE: f64 = 10.0;
         let best = (settled.iter().map(|s| s.refined.score)).fold(f64::NEG_INFINITY, f64::max);
+        let leaves = |s: &Settled| FourNumbers::new(&s.refined.fit.residual, &self.atlas.layout).omnibus_p();
+        if settled
+            .iter()
+            .filter(|s| s.refined.score == best)
+            .any(|s| leaves(s) < HOPELESS_P)
+        {
+            return settled;
+        }
         let (close, mut others): (Vec<_>, Vec<_>) =
             (settled.into_iter()).partition(|s| s.refined.score > best - CLOSE);
         let sets = if close.len() > 1 { CLOSE_SETS } else { FINAL_SETS };
@@ -256,9 +268,9 @@ impl Search<'_> {
 
 /// Whether the best descent leaves far too much and does not get on: more rounds would not make an answer of it.
 fn is_hopeless(descent: &Descent, progress: f64) -> bool {
-    const P: f64 = 1e-12;
     const SLOW: f64 = 0.1;
-    (descent.remainder).is_some_and(|left| left.omnibus_p() < P && progress < SLOW * 0.5 * left.excess())
+    (descent.remainder)
+        .is_some_and(|left| left.omnibus_p() < HOPELESS_P && progress < SLOW * 0.5 * left.excess())
 }
 
 /// Best first.
