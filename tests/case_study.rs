@@ -7,6 +7,37 @@ use crate::support::Scratch;
 /// Signatures that are kept from one call of the tests to the next.
 const CACHE: &str = concat!(env!("CARGO_TARGET_TMPDIR"), "/signatures");
 
+#[test]
+fn reproduce_says_which_laps_cannot_be_traced() {
+    let scratch = Scratch::new();
+    let drive = [
+        "drive", "--name", "short", "--runs", "2", "--laps", "2", "--out", "short", "--quiet",
+    ];
+    scratch.done(drive);
+    let reproduce = [
+        "reproduce",
+        "--measured",
+        "short",
+        "--seeds",
+        "2",
+        "--cache",
+        CACHE,
+        "--out",
+        "report",
+    ];
+    let ran = scratch.done(reproduce);
+    assert!(
+        ran.stdout.contains("these laps cannot be traced"),
+        "{}",
+        ran.stdout
+    );
+    let tables: Value = serde_json::from_str(&scratch.read("report/tables.json")).unwrap();
+    let why = tables["trace"]["braitenberg"]["not_traced"].as_str().unwrap();
+    assert!(why.contains("at least 3"), "{why}");
+    let report = scratch.read("report/report.html");
+    assert!(report.contains("These laps cannot be traced"), "{report}");
+}
+
 /// Laps of a robot whose wheels differ, and laps of the other controller as the declared model drives them.
 fn measure(scratch: &Scratch) {
     scratch.write(

@@ -6,7 +6,9 @@ use std::sync::OnceLock;
 use serde_json::Value;
 
 use crate::support::Scratch;
-use crate::tracing::{holds, names, never_a_listed_name, practice, says, share_signatures, trace, try_trace};
+use crate::tracing::{
+    GAINS, holds, names, never_a_listed_name, practice, says, share_signatures, trace, try_trace,
+};
 
 /// A trace of a camera-only data set, all of which share their signatures.
 fn laps(controller: &str, name: &str) -> Value {
@@ -65,9 +67,6 @@ fn a_larger_wheel_of_the_rule_based_robot_is_named() {
     says(&trace, "explained", &["wheel-asymmetry"]);
     holds(&trace["effects"][0], "ratio", 1.023_03, 1.0);
 }
-
-/// With camera data alone these are one class.
-const GAINS: [&str; 3] = ["reading-gain", "distance-scale", "controller-gain"];
 
 #[test]
 fn a_gain_that_differs_by_run_is_seen_to() {

@@ -15,6 +15,9 @@ use crate::support::{Ran, Scratch, repository};
 pub(crate) const RUNS: usize = 4;
 pub(crate) const LAPS: usize = 5;
 
+/// With camera data alone of the Braitenberg controller these are one class.
+pub(crate) const GAINS: [&str; 3] = ["reading-gain", "distance-scale", "controller-gain"];
+
 /// The names of runs.
 pub(crate) const NAMES: [&str; 8] = ["a", "b", "c", "d", "e", "f", "g", "h"];
 

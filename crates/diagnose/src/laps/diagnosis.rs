@@ -120,7 +120,7 @@ fn explain(search: &Search<'_>, screened: &[Screened]) -> Vec<Found> {
         found.extend(search.patterns(&found));
         sort(&mut found);
     }
-    if !first_is(&found, fits) {
+    if !first_is(&found, suffices) {
         let pairs = search.pairs(&found);
         found = preferred(found, pairs);
     }
