@@ -89,6 +89,8 @@ fn two_effects_at_once_are_both_seen() {
     let parameters = effects[shift]["parameters"].as_array().unwrap();
     let dx = parameters.iter().find(|p| p["name"] == "dx_m").unwrap();
     assert!((dx["value"].as_f64().unwrap() - 0.001_04).abs() < 2.5e-4, "{dx}");
+    let gain = effects[1 - shift]["name"].as_str().unwrap();
+    assert!(GAINS.contains(&gain), "{trace:#}");
     // A gain of 0.97 is small beside it: so few laps do not tell it from its neighbours, but they do report it.
     let sets = trace["alternative_sets"].as_array().unwrap();
     let truth = |set: &&Value| {

@@ -103,11 +103,14 @@ impl Trace {
             laps[few.unwrap_or(0)].len()
         );
         let logged = with_logs(&recordings);
+        // Logs name the effect, and the laps judge it.
+        let purpose = if logged.is_some() {
+            Purpose::Judge
+        } else {
+            Purpose::Name
+        };
         let parts = (recordings.iter())
-            .map(|recording| match logged {
-                Some(_) => judging_atlas(session, recording),
-                None => atlas(session, recording, cache),
-            })
+            .map(|recording| atlas(session, recording, purpose, cache))
             .collect::<Result<Vec<_>>>()?;
         let atlas = Atlas::join(parts).expect("at least one data set is measured");
         let baselines = logged.is_none().then(|| atlas.baselines(&laps)).transpose()?;
@@ -221,7 +224,11 @@ fn errors(
         let laps_of = |effects: &[Setting]| MeanLaps::new(&recording.setup, effects, seed, wanted);
         let before = laps_of(&[])?;
         let settings: Vec<Setting> = answer.settings().iter().map(|s| slice(s, own.clone())).collect();
-        let after = laps_of(&settings)?;
+        let after = if settings.is_empty() {
+            before.clone()
+        } else {
+            laps_of(&settings)?
+        };
         let (held_out, after_m) = match &unseen {
             Some((at, _)) if *at != place => continue,
             Some((_, runs)) => (
@@ -283,17 +290,6 @@ fn with_simulations<R>(
     use_them(&declared, &cuts)
 }
 
-/// What the declared model leads one to expect of a recording: enough to judge laps by.
-fn judging_atlas(session: &Session, recording: &Recording) -> Result<Atlas> {
-    let sets = Atlas::null_sets(recording.cuts.len());
-    let progress = session.progress("simulating the declared model", sets);
-    let atlas = with_simulations(recording, session.seed(), |declared, cuts| {
-        Atlas::without_effects(declared, cuts, &|| progress.tick(1))
-    });
-    interrupt::check()?;
-    Ok(atlas?)
-}
-
 /// Laps simulated for a diagnosis; those of a cached atlas count as if they were simulated now.
 fn laps_simulated(recordings: &[Recording], atlas: &Atlas, judged_only: bool) -> u64 {
     let of = |recording: &Recording| {
@@ -308,20 +304,36 @@ fn laps_simulated(recordings: &[Recording], atlas: &Atlas, judged_only: bool) ->
     recordings.iter().map(of).sum()
 }
 
+/// What an atlas is for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Purpose {
+    /// To name what laps lack.
+    Name,
+    /// To judge laps by: it knows no effect.
+    Judge,
+}
+
 /// A recording's atlas, from the cache or made now.
-fn atlas(session: &Session, recording: &Recording, cache: &Cache) -> Result<Atlas> {
+fn atlas(session: &Session, recording: &Recording, purpose: Purpose, cache: &Cache) -> Result<Atlas> {
     let Recording { config, world, .. } = recording;
     let shape = recording.shape();
-    let key = format!("{}\n{world}\n{shape:?}\n{}", config.to_toml(), session.seed());
+    let key = format!(
+        "{purpose:?}\n{}\n{world}\n{shape:?}\n{}",
+        config.to_toml(),
+        session.seed()
+    );
     if let Some(atlas) = cache.get(&key) {
         return Ok(atlas);
     }
-    let progress = session.progress(
-        "simulating what each effect would do",
-        Atlas::sets(recording.cuts.len()),
-    );
-    let atlas = with_simulations(recording, session.seed(), |declared, cuts| {
-        Atlas::new(declared, cuts, &|| progress.tick(1))
+    let cuts = recording.cuts.len();
+    let progress = match purpose {
+        Purpose::Name => session.progress("simulating what each effect would do", Atlas::sets(cuts)),
+        Purpose::Judge => session.progress("simulating the declared model", Atlas::null_sets(cuts)),
+    };
+    let tick = || progress.tick(1);
+    let atlas = with_simulations(recording, session.seed(), |declared, cuts| match purpose {
+        Purpose::Name => Atlas::new(declared, cuts, &tick),
+        Purpose::Judge => Atlas::without_effects(declared, cuts, &tick),
     });
     drop(progress);
     interrupt::check()?;

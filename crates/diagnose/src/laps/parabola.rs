@@ -44,18 +44,32 @@ impl Atlas {
             .iter()
             .flat_map(|(_, a, b)| a.1.summaries.iter().chain(&b.1.summaries));
         let scatter = self.scatter_of(center.summaries.iter().chain(all))?;
-        let action = |e: &Evaluated| white(&scatter, &self.layout, &e.expectation, &center.expectation);
-        let mut columns = Vec::new();
-        for (group, (down_by, down), (up_by, up)) in &sides {
-            let (down, up) = (action(down), action(up));
-            for (i, freedom) in group.iter().enumerate() {
-                let mask = |w: &White| {
-                    freedom
-                        .run()
-                        .map_or_else(|| w.clone(), |run| of_run(w, run, &self.layout))
-                };
-                columns.push(Column::through((down_by[i], mask(&down)), (up_by[i], mask(&up))));
+        let columns_of = |expected: &dyn Fn(&Evaluated) -> Expectation| -> Vec<Column> {
+            let from = expected(&center);
+            let action = |e: &Evaluated| white(&scatter, &self.layout, &expected(e), &from);
+            let mut columns = Vec::new();
+            for (group, (down_by, down), (up_by, up)) in &sides {
+                let (down, up) = (action(down), action(up));
+                for (i, freedom) in group.iter().enumerate() {
+                    let mask = |w: &White| {
+                        freedom
+                            .run()
+                            .map_or_else(|| w.clone(), |run| of_run(w, run, &self.layout))
+                    };
+                    columns.push(Column::through((down_by[i], mask(&down)), (up_by[i], mask(&up))));
+                }
             }
+            columns
+        };
+        let mut columns = columns_of(&|e| e.expectation.clone());
+        let half = center.summaries.len() / 2;
+        let part = |first: usize| {
+            columns_of(&|e| Expectation::of(e.summaries[first..first + half].iter(), e.doubt.alike))
+        };
+        // The mean of two halves is off by half their difference.
+        let of_all = (2.0 * half as f64 / center.summaries.len() as f64).sqrt();
+        for ((column, a), b) in columns.iter_mut().zip(part(0)).zip(part(half)) {
+            column.doubt = (a.slope - b.slope) * (0.5 * of_all);
         }
         Some(Local {
             center: center.expectation,
@@ -108,6 +122,8 @@ pub(super) struct Local {
 pub(super) struct Column {
     pub(super) slope: White,
     pub(super) curvature: White,
+    /// How the slope is off for the simulation's own error: one draw of it.
+    pub(super) doubt: White,
 }
 
 impl Column {
@@ -116,6 +132,7 @@ impl Column {
         Self {
             slope: &self.slope + &self.curvature * (2.0 * moved),
             curvature: self.curvature.clone(),
+            doubt: self.doubt.clone(),
         }
     }
 
@@ -128,12 +145,17 @@ impl Column {
             let slope = if by == 0.0 { action * 0.0 } else { action / by };
             return Self {
                 curvature: &slope * 0.0,
+                doubt: &slope * 0.0,
                 slope,
             };
         }
         let curvature = (&up.1 / b - &down.1 / a) / (b - a);
         let slope = &up.1 / b - &curvature * b;
-        Self { slope, curvature }
+        Self {
+            doubt: &slope * 0.0,
+            slope,
+            curvature,
+        }
     }
 }
 
@@ -176,10 +198,19 @@ pub(super) fn nearest(
             break;
         }
     }
-    let covariance = normal
-        .cholesky()
-        .map_or_else(|| DMatrix::identity(count, count), |f| f.inverse());
+    let covariance = covariance(columns, normal);
     (moves, covariance)
+}
+
+/// The covariance of moves with these normal equations. What is noise in the slopes tells nothing, and follows the data's.
+fn covariance(columns: &[Column], normal: DMatrix<f64>) -> DMatrix<f64> {
+    let count = columns.len();
+    let noise = DMatrix::from_fn(count, count, |i, j| columns[i].doubt.dot(&columns[j].doubt));
+    let inverse = |matrix: DMatrix<f64>| matrix.cholesky().map(|factor| factor.inverse());
+    match inverse(&normal - noise) {
+        Some(without) => &without * normal * &without,
+        None => inverse(normal).unwrap_or_else(|| DMatrix::identity(count, count)),
+    }
 }
 
 /// What the parabolas at some moves leave of the target.
