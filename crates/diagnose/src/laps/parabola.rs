@@ -230,3 +230,30 @@ fn bounded(moves: &DVector<f64>, step: &DVector<f64>, share: f64, freedoms: &[Fr
         (moves[i] + share * step[i]).clamp(-most, most)
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use sim::Streams;
+
+    use super::*;
+
+    #[test]
+    fn noise_in_a_slope_is_no_information() {
+        const ENTRIES: usize = 400;
+        let mut stream = Streams { seed: 3, run: 0 }.open("noise");
+        let mut noise = || White::from_fn(ENTRIES, |_, _| 0.2 * stream.normal());
+        // Information 36, to which the noise of the slope seems to add 16.
+        let column = Column {
+            slope: White::from_element(ENTRIES, 0.3) + noise(),
+            curvature: White::zeros(ENTRIES),
+            doubt: noise(),
+        };
+        let normal = DMatrix::from_element(1, 1, column.slope.norm_squared());
+        let variance = covariance(&[column], normal)[(0, 0)];
+        let expected = 52.0 / (36.0 * 36.0);
+        assert!(
+            (variance / expected - 1.0).abs() < 0.2,
+            "{variance} for {expected}"
+        );
+    }
+}

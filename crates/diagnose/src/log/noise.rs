@@ -23,6 +23,8 @@ fn factor(evidence: &Evidence<'_>, settings: &[Setting], base: f64, spec: &'stat
     };
     /// Log-likelihood gained below which the exact factor does not matter.
     const NOTHING: f64 = 3.0;
+    /// Logarithm of the factor to either side over which the log-likelihood's curvature tells the error.
+    const WIDE: f64 = 0.08;
     let (mut middle, mut top, mut half) = (0.0, base, 0.15);
     let mut bend = -1.0;
     for _ in 0..12 {
@@ -55,6 +57,12 @@ fn factor(evidence: &Evidence<'_>, settings: &[Setting], base: f64, spec: &'stat
     }
     if middle == 0.0 {
         return None;
+    }
+    // The log-likelihood is rough at a small scale: readings come and go at edges.
+    if top - base > NOTHING
+        && let (Some(low), Some(high)) = (at(middle - WIDE), at(middle + WIDE))
+    {
+        bend = (high - 2.0 * top + low) / (WIDE * WIDE);
     }
     let error = middle.exp() / (-bend).max(1e-9).sqrt();
     let mut all = settings.to_vec();
