@@ -111,6 +111,13 @@ impl Part {
         }
     }
 
+    /// Whether its size came to the neutral one in every run: sizes in steps do.
+    pub(super) fn is_nothing(&self, probe: &Probe) -> bool {
+        let size = probe.size_index();
+        let at_neutral = |values: &Vec<f64>| values[size] == probe.neutral;
+        probe.quantum.is_some() && self.per_s == 0.0 && self.values.iter().all(at_neutral)
+    }
+
     fn setting(&self, probe: &Probe) -> Setting {
         let pattern = match self.shape {
             Shape::Constant => Pattern::Constant(self.values[0].clone()),

@@ -281,7 +281,8 @@ impl Atlas {
         Ok(self.quantised(self.with_moves(hypothesis, freedoms, &moves)))
     }
 
-    /// A hypothesis at its most likely sizes, simulated often enough to judge it.
+    /// A hypothesis at its most likely sizes, simulated often enough to judge it; `None` where the robot crashes, and where
+    /// one of its effects came to nothing.
     pub(super) fn settle(
         &self,
         simulate: &Simulate<'_>,
@@ -289,6 +290,13 @@ impl Atlas {
         found: &Descent,
     ) -> Option<Settled> {
         let hypothesis = self.quantised(found.hypothesis.clone());
+        if hypothesis
+            .parts
+            .iter()
+            .any(|part| part.is_nothing(&self.probes[part.probe]))
+        {
+            return None;
+        }
         let end = self.evaluate(simulate, &hypothesis, self.enough(END_SETS, 1))?;
         let fit = self.fit(data, &end)?;
         Some(self.settled(hypothesis, found.errors(), fit, end))
