@@ -130,7 +130,9 @@ fn explain(search: &Search<'_>, screened: &[Screened]) -> Vec<Found> {
         let further = search.further(best);
         found = preferred(found, further);
     }
-    if !first_is(&found, suffices) {
+    // No cause without a name explains what several with theirs explain nearly all of.
+    let nearly_all = |best: &Explanation| best.effects.len() > 1 && best.share >= ENOUGH;
+    if !first_is(&found, |best| suffices(best) || nearly_all(best)) {
         found = unless_named(found, search.unnamed());
     }
     found
