@@ -91,13 +91,6 @@ fn two_effects_at_once_are_both_seen() {
     assert!((dx["value"].as_f64().unwrap() - 0.001_04).abs() < 2.5e-4, "{dx}");
     let gain = effects[1 - shift]["name"].as_str().unwrap();
     assert!(GAINS.contains(&gain), "{trace:#}");
-    // A gain of 0.97 is small beside it: so few laps do not tell it from its neighbours, but they do report it.
-    let sets = trace["alternative_sets"].as_array().unwrap();
-    let truth = |set: &&Value| {
-        let names: Vec<&str> = set.as_array().unwrap().iter().filter_map(Value::as_str).collect();
-        names.contains(&"reading-gain") && names.contains(&"camera-offset")
-    };
-    assert!(sets.iter().any(|set| truth(&set)), "{sets:?}");
     helps(&trace);
 }
 
