@@ -1,9 +1,9 @@
 //! Effects that the program does not know, written here: it sees nothing of them but files.
 
-use sim::{Effect, Moment, Param, Setting, Spec, Stage, Vec2, WheelSpeeds};
+use sim::{Effect, Machine, Moment, Param, Readings, Setting, Spec, Stage, Vec2, WheelSpeeds};
 
 use crate::support::Scratch;
-use crate::tracing::{Robot, holds, never_a_listed_name, says, share_signatures, trace};
+use crate::tracing::{GAINS, Robot, holds, never_a_listed_name, says, share_signatures, trace};
 
 /// A listed effect, written anew under another name.
 pub(crate) static LIMP: Spec = Spec {
@@ -74,6 +74,27 @@ impl Effect for Puddle {
     }
 }
 
+/// Sensors that warm up: their readings grow for some minutes after the start.
+static WARMING: Spec = Spec {
+    name: "warming",
+    stage: Stage::Sense,
+    summary: "readings settle after the start",
+    params: &[Param::new("share", "", 0.0, -0.9, 0.9)],
+    list: None,
+    build: || Box::new(Warming),
+};
+
+#[derive(Debug)]
+struct Warming;
+
+impl Effect for Warming {
+    fn readings(&mut self, values: &[f64], now: &Moment, _machine: &Machine, readings: &mut Readings) {
+        const TIME_S: f64 = 150.0;
+        let warm = 1.0 - (-now.time_s / TIME_S).exp();
+        readings.iter_mut().for_each(|r| *r *= 1.0 + values[0] * warm);
+    }
+}
+
 /// The robot whose left wheel is larger.
 pub(crate) fn limping() -> Robot {
     Robot::with(Setting::constant(&LIMP, [LIMPING]))
@@ -87,6 +108,19 @@ fn a_listed_effect_under_another_name_is_named_from_laps() {
     let found = trace(&scratch, "braitenberg", "set", &[]);
     says(&found, "explained", &["wheel-asymmetry"]);
     holds(&found["effects"][0], "ratio", LIMPING, 1.0);
+}
+
+#[test]
+fn sensors_that_warm_up_are_a_gain_that_changes_in_time() {
+    share_signatures("braitenberg");
+    let scratch = Scratch::new();
+    Robot::with(Setting::constant(&WARMING, [0.4])).record(&scratch, "set");
+    let found = trace(&scratch, "braitenberg", "set", &[]);
+    assert_eq!(found["verdict"], "explained", "{found:#}");
+    let effect = &found["effects"][0];
+    assert_eq!(effect["by"], "time", "{found:#}");
+    let name = effect["name"].as_str().unwrap();
+    assert!(GAINS.contains(&name), "{found:#}");
 }
 
 #[test]
