@@ -223,18 +223,21 @@ mod tests {
         }
     }
 
+    /// The slip of standing still in one step of ten: mean 0.9, variance 0.09 + 0.9 * 0.01 / 3 of a slip of 0.1.
+    fn slip_of_stalls() -> f64 {
+        ((0.09_f64 + 0.003) / (0.01 / 3.0)).sqrt() / 0.9
+    }
+
     #[test]
     fn wheels_that_stand_still_now_and_then_have_no_name() {
-        // Standing still in one step of ten: mean 0.9, variance 0.09 + 0.9 * 0.01 / 3 of a slip of 0.1.
-        let slip = ((0.09_f64 + 0.003) / (0.01 / 3.0)).sqrt() / 0.9;
-        let doubted = answer(0.9, slip).unless_stalls(0.1);
+        let doubted = answer(0.9, slip_of_stalls()).unless_stalls(0.1);
         assert_eq!(doubted.verdict, Verdict::Unexplained);
         assert_eq!(doubted.cause.unwrap().depends_on, "chance");
     }
 
     #[test]
     fn it_is_enough_that_the_data_do_not_tell_it_from_the_answer() {
-        let slip = ((0.09_f64 + 0.003) / (0.01 / 3.0)).sqrt() / 0.9;
+        let slip = slip_of_stalls();
         let mut doubted = answer(0.9, 1.5 * slip);
         doubted.explanations.extend(answer(0.9, slip).explanations);
         assert_eq!(doubted.clone().unless_stalls(0.1).verdict, Verdict::Explained);

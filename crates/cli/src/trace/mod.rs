@@ -139,7 +139,7 @@ impl Trace {
         interrupt::check()?;
         let mut trace = Self {
             remarks: remarks(&recordings),
-            laps_simulated: laps_simulated(&recordings, &atlas, from_logs.is_some()),
+            laps_simulated: laps_simulated(&recordings, &atlas, purpose),
             detectable: atlas.detectable(),
             experiments: Vec::new(),
             recordings,
@@ -291,14 +291,9 @@ fn with_simulations<R>(
 }
 
 /// Laps simulated for a diagnosis; those of a cached atlas count as if they were simulated now.
-fn laps_simulated(recordings: &[Recording], atlas: &Atlas, judged_only: bool) -> u64 {
+fn laps_simulated(recordings: &[Recording], atlas: &Atlas, purpose: Purpose) -> u64 {
     let of = |recording: &Recording| {
-        let cuts = recording.cuts.len();
-        let sets = if judged_only {
-            Atlas::null_sets(cuts)
-        } else {
-            Atlas::sets(cuts)
-        };
+        let sets = purpose.sets(recording.cuts.len());
         (sets + atlas.spent()) * recording.shape().iter().sum::<usize>() as u64
     };
     recordings.iter().map(of).sum()
@@ -313,6 +308,16 @@ enum Purpose {
     Judge,
 }
 
+impl Purpose {
+    /// Data sets simulated for it with so many other cuts of the walls.
+    fn sets(self, cuts: usize) -> u64 {
+        match self {
+            Self::Name => Atlas::sets(cuts),
+            Self::Judge => Atlas::null_sets(cuts),
+        }
+    }
+}
+
 /// A recording's atlas, from the cache or made now.
 fn atlas(session: &Session, recording: &Recording, purpose: Purpose, cache: &Cache) -> Result<Atlas> {
     let Recording { config, world, .. } = recording;
@@ -325,11 +330,11 @@ fn atlas(session: &Session, recording: &Recording, purpose: Purpose, cache: &Cac
     if let Some(atlas) = cache.get(&key) {
         return Ok(atlas);
     }
-    let cuts = recording.cuts.len();
-    let progress = match purpose {
-        Purpose::Name => session.progress("simulating what each effect would do", Atlas::sets(cuts)),
-        Purpose::Judge => session.progress("simulating the declared model", Atlas::null_sets(cuts)),
+    let doing = match purpose {
+        Purpose::Name => "simulating what each effect would do",
+        Purpose::Judge => "simulating the declared model",
     };
+    let progress = session.progress(doing, purpose.sets(recording.cuts.len()));
     let tick = || progress.tick(1);
     let atlas = with_simulations(recording, session.seed(), |declared, cuts| match purpose {
         Purpose::Name => Atlas::new(declared, cuts, &tick),

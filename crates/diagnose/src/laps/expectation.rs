@@ -180,18 +180,9 @@ impl Scatter {
                 (chance - if i == j { 1.0 } else { 0.0 }).powi(2)
             })
             .sum();
-        let by_chance = (size * (size + 1)) as f64 / freedom;
-        let share = (by_chance / apart).min(1.0);
-        let freedom = ((1.0 - share).powi(2) / freedom + share.powi(2) / other.freedom).recip();
+        let share = share_by_chance(apart, freedom, size);
         let target = &other.axes * DMatrix::from_diagonal(&target) * other.axes.transpose();
-        let lap = own * (1.0 - share) + target * share;
-        Self::with(
-            lap,
-            freedom,
-            other.second.clone(),
-            other.open.clone(),
-            other.axes.clone(),
-        )
+        other.blended(own, freedom, target, share)
     }
 
     /// The scatter of the laps of these recordings drawn towards this one, as far as chance explains the difference.
@@ -207,14 +198,18 @@ impl Scatter {
         root.l_dirty().solve_lower_triangular_mut(&mut apart);
         apart.transpose_mut();
         root.l_dirty().solve_lower_triangular_mut(&mut apart);
-        let by_chance = (size * (size + 1)) as f64 / freedom;
-        let share = (by_chance / apart.norm_squared()).min(1.0);
+        let share = share_by_chance(apart.norm_squared(), freedom, size);
         if share == 1.0 {
             return Some(self.clone());
         }
+        self.blended(own, freedom, common, share)
+    }
+
+    /// A covariance of one lap blended with a share of a target; the rest is this scatter's.
+    fn blended(&self, own: DMatrix<f64>, freedom: f64, target: DMatrix<f64>, share: f64) -> Option<Self> {
         let freedom = ((1.0 - share).powi(2) / freedom + share.powi(2) / self.freedom).recip();
         Self::with(
-            own * (1.0 - share) + common * share,
+            own * (1.0 - share) + target * share,
             freedom,
             self.second.clone(),
             self.open.clone(),
@@ -321,6 +316,13 @@ fn smoothed(ratios: &DVector<f64>) -> DVector<f64> {
     })
 }
 
+/// Share of a squared distance from what a covariance should be, in units of that, which chance explains if it was estimated
+/// with `freedom` degrees of freedom.
+fn share_by_chance(apart: f64, freedom: f64, size: usize) -> f64 {
+    let by_chance = (size * (size + 1)) as f64 / freedom;
+    (by_chance / apart).min(1.0)
+}
+
 /// What makes the inverse of a covariance estimated with `freedom` degrees of freedom in `size` dimensions unbiased (the mean
 /// of the inverse Wishart distribution); `None` where it has none.
 fn inflation(freedom: f64, size: usize) -> Option<f64> {
@@ -369,12 +371,17 @@ mod tests {
         }
     }
 
+    /// A well known scatter of these laps.
+    fn known(smooth: f64) -> Scatter {
+        let lap = covariance(smooth);
+        let axes = axes(&lap);
+        let second = DMatrix::identity(SECOND, SECOND).cholesky().unwrap();
+        Scatter::with(lap, 1e4, second, DMatrix::zeros(SIZE, SIZE), axes).unwrap()
+    }
+
     #[test]
     fn the_scatter_of_few_recordings_is_neither_too_wide_nor_too_narrow() {
-        let declared = covariance(4.0);
-        let axes = axes(&declared);
-        let second = DMatrix::identity(SECOND, SECOND).cholesky().unwrap();
-        let other = Scatter::with(declared, 1e4, second, DMatrix::zeros(SIZE, SIZE), axes).unwrap();
+        let other = known(4.0);
         // Nine times the smooth variance, the same noise: no multiple of what was declared.
         for smooth in [4.0, 36.0] {
             let truth = covariance(smooth).cholesky().unwrap();
@@ -397,10 +404,7 @@ mod tests {
 
     #[test]
     fn rivals_share_a_scatter_unless_theirs_differ_by_more_than_chance() {
-        let declared = covariance(4.0);
-        let axes = axes(&declared);
-        let second = DMatrix::identity(SECOND, SECOND).cholesky().unwrap();
-        let common = Scatter::with(declared, 1e4, second, DMatrix::zeros(SIZE, SIZE), axes).unwrap();
+        let common = known(4.0);
         let mut stream = Streams { seed: 6, run: 0 }.open("laps");
         for (smooth, kept) in [(4.0, 0.1), (8.0, 0.8)] {
             let truth = covariance(smooth).cholesky().unwrap();

@@ -214,21 +214,15 @@ impl Hypothesis {
         let [part] = self.parts.as_slice() else {
             return None;
         };
-        let probe = &atlas.probes[part.probe];
-        let runs = if shape == Shape::ByRun {
-            atlas.layout.runs()
-        } else {
-            1
-        };
-        let can = match shape {
-            Shape::Constant => false,
-            Shape::ByRun => runs > 1,
-            Shape::ByTime => !probe.drifts(),
+        let (can, lists) = match shape {
+            Shape::Constant => (false, 1),
+            Shape::ByRun => (atlas.layout.runs() > 1, atlas.layout.runs()),
+            Shape::ByTime => (!atlas.probes[part.probe].drifts(), 1),
         };
         (can && part.shape == Shape::Constant).then(|| Self {
             parts: vec![Part {
                 shape,
-                values: vec![part.values[0].clone(); runs],
+                values: vec![part.values[0].clone(); lists],
                 ..part.clone()
             }],
         })

@@ -171,7 +171,7 @@ impl Atlas {
             let (moved, error) = (moves[i].abs(), covariance[(i, i)].sqrt());
             moved < SETTLED * error || moved < WITHIN.0 * error && WITHIN.1 * moved < freedoms[i].step
         });
-        let remainder = FourNumbers::new(&fit.residual, &self.layout);
+        let remainder = (round == Round::Full).then(|| FourNumbers::new(&fit.residual, &self.layout));
         for (i, freedom) in freedoms.iter_mut().enumerate() {
             errors[i] = (covariance[(i, i)] * (1.0 + local.doubt.error)).sqrt();
             // The parabola should hold where the answer may lie, and be wide enough for the noise of its points not to
@@ -183,7 +183,7 @@ impl Atlas {
             score: hypothesis.worth(fit.gain) - self.price_of(&hypothesis),
             found: round == Round::Full && settled,
             near: Some((local, moves)),
-            remainder: (round == Round::Full).then_some(remainder),
+            remainder,
             hypothesis,
             freedoms,
             errors,

@@ -83,16 +83,17 @@ impl Search<'_> {
     /// The best single effects with sizes that go over the runs or in time, where what they leave does, tried to the end.
     pub(super) fn patterns(&self, singles: &[Found]) -> Vec<Found> {
         const STARTS: usize = 3;
-        let goes = |found: &Found| {
-            let left = found.explanation.remainder;
-            let by_run = left.is_some_and(|left| left.runs.p < SIGNIFICANT_P);
-            let by_time = left.is_some_and(|left| left.trend.p < SIGNIFICANT_P);
-            [(Shape::ByRun, by_run), (Shape::ByTime, by_time)]
-                .into_iter()
-                .filter_map(|(shape, goes)| goes.then(|| found.hypothesis.over(shape, self.atlas)).flatten())
-                .collect::<Vec<_>>()
-        };
-        let starts: Vec<Hypothesis> = singles.iter().take(STARTS).flat_map(goes).collect();
+        let mut starts: Vec<Hypothesis> = Vec::new();
+        for found in singles.iter().take(STARTS) {
+            let Some(left) = found.explanation.remainder else {
+                continue;
+            };
+            for (shape, left) in [(Shape::ByRun, left.runs), (Shape::ByTime, left.trend)] {
+                if left.p < SIGNIFICANT_P {
+                    starts.extend(found.hypothesis.over(shape, self.atlas));
+                }
+            }
+        }
         self.try_rounds(starts.iter(), &ROUNDS_OF_SEVERAL)
     }
 
@@ -190,11 +191,8 @@ impl Search<'_> {
                 .collect();
             let best = (alive.iter().map(|d| d.score)).fold(f64::NEG_INFINITY, f64::max);
             alive.retain(|d| d.score >= best - behind.max(share * best));
-            if alive
-                .iter()
-                .filter(|d| d.score == best)
-                .any(|d| is_hopeless(d, best - before))
-            {
+            let first = alive.iter().find(|d| d.score == best);
+            if first.is_some_and(|first| is_hopeless(first, best - before)) {
                 break;
             }
             before = best;
@@ -215,11 +213,8 @@ impl Search<'_> {
         const CLOSE: f64 = 10.0;
         let best = (settled.iter().map(|s| s.refined.score)).fold(f64::NEG_INFINITY, f64::max);
         let leaves = |s: &Settled| FourNumbers::new(&s.refined.fit.residual, &self.atlas.layout).omnibus_p();
-        if settled
-            .iter()
-            .filter(|s| s.refined.score == best)
-            .any(|s| leaves(s) < HOPELESS_P)
-        {
+        let first = settled.iter().find(|s| s.refined.score == best);
+        if first.is_some_and(|first| leaves(first) < HOPELESS_P) {
             return settled;
         }
         let (close, mut others): (Vec<_>, Vec<_>) =
