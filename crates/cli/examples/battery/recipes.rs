@@ -10,6 +10,8 @@ enum Scale {
     Factor,
     /// The value is the size.
     Sum,
+    /// The value is one over the size: a limit, which acts the more the lower it is.
+    Limit,
 }
 
 /// Which way a size may go.
@@ -50,7 +52,7 @@ const fn recipe(
     }
 }
 
-use Scale::{Factor, Sum};
+use Scale::{Factor, Limit, Sum};
 use Way::{Both, Down, Up};
 
 /// Every effect of the list.
@@ -80,7 +82,7 @@ pub(crate) const RECIPES: &[Recipe] = &[
     recipe("command-delay", "time_s", Sum, Up, [0.032, 0.256]),
     recipe("dead-band", "speed_m_s", Sum, Up, [0.036, 0.047]),
     recipe("speed-step", "speed_m_s", Sum, Up, [0.004, 0.03]),
-    recipe("acceleration-limit", "m_s2", Sum, Up, [0.04, 0.5]),
+    recipe("acceleration-limit", "m_s2", Limit, Up, [2.0, 25.0]),
     recipe("turn-scrub", "fraction", Sum, Up, [0.04, 0.3]),
     recipe("battery-sag", "per_s", Sum, Up, [1e-5, 1.5e-4]),
     recipe("floor-tilt", "speed_m_s", Sum, Up, [2e-4, 1.5e-3]),
@@ -143,6 +145,7 @@ impl Recipe {
         let value = match self.scale {
             Scale::Factor => size.exp(),
             Scale::Sum => size,
+            Scale::Limit => size.recip(),
         };
         if self.name == "command-delay" {
             return rounded((value / PHYSICS_STEP_S).round().max(1.0) * PHYSICS_STEP_S);
