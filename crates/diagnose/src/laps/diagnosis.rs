@@ -111,18 +111,26 @@ impl Atlas {
 fn explain(search: &Search<'_>, screened: &[Screened]) -> Vec<Found> {
     let mut found = search.singles(screened);
     // Of an effect that jumps a descent finds the nearest good size, not the best.
-    let jumps = found.first().is_some_and(|best| search.jumps(best));
+    let jumps = found.first().is_some_and(|best| search.jumped(best));
     if !first_is(&found, |best| suffices(best) || best.share > MOST && !jumps) {
-        found.extend(search.scans());
+        let scans = search.scans();
+        if !scans.is_empty() {
+            found.retain(|found| !search.jumped(found));
+        }
+        found.extend(scans);
         sort(&mut found);
     }
     if !first_is(&found, fits) {
         found.extend(search.patterns(&found));
         sort(&mut found);
     }
-    if !first_is(&found, suffices) {
+    if !first_is(&found, fits) {
         let pairs = search.pairs(&found);
         found = preferred(found, pairs);
+    }
+    if !first_is(&found, suffices) {
+        let beside = search.scans_beside(&found);
+        found = preferred(found, beside);
     }
     if let Some(best) = found.first().filter(|best| best.explanation.effects.len() > 1)
         && !suffices(&best.explanation)

@@ -4,31 +4,134 @@ use rayon::prelude::*;
 
 use super::atlas::{Atlas, Simulate};
 use super::expectation::Expectation;
-use super::hypothesis::{Hypothesis, Part, Shape};
-use super::refine::Descent;
+use super::hypothesis::{Hypothesis, Part};
+
+/// Data sets simulated at each size, at one spacing after the other.
+const CLOSER: [u64; 3] = [3, 4, 8];
+
+/// The best of many sizes of a probe that jumps, beside a hypothesis.
+#[derive(Debug, Clone)]
+pub(super) struct Hunt {
+    beside: Hypothesis,
+    probe: usize,
+    /// Squared distance that is left.
+    pub(super) left: f64,
+    size: f64,
+    /// Distance of the sizes that were tried.
+    spacing: f64,
+}
 
 impl Atlas {
-    /// The size of an effect that jumps, by trying many: all over the probe's range, then ever closer about the best. `None`
-    /// where no size explains a fair share.
-    pub(super) fn hunt(&self, simulate: &Simulate<'_>, data: &Expectation, probe: usize) -> Option<Descent> {
+    /// An effect that jumps beside a hypothesis, at sizes all over its probe's range. `None` where no size explains a fair
+    /// share of what the hypothesis leaves.
+    pub(super) fn hunt(
+        &self,
+        simulate: &Simulate<'_>,
+        data: &Expectation,
+        beside: &Hypothesis,
+        probe: usize,
+    ) -> Option<Hunt> {
         const COARSE: usize = 60;
         const COARSE_SETS: u64 = 1;
-        const CLOSER: [u64; 3] = [4, 8, 12];
         const FAIR_SHARE: f64 = 0.25;
         let p = &self.probes[probe];
         let (low, high) = (p.sizes[0], p.sizes[p.sizes.len() - 1]);
         // Sizes in a constant ratio: what matters is how many steps fit into a speed or a reading.
         let ratio = (high / low).powf(1.0 / (COARSE - 1) as f64);
         let sizes: Vec<f64> = (0..COARSE).map(|i| low * ratio.powi(i as i32)).collect();
-        let (left, mut best) = least(&self.distances(simulate, data, probe, &sizes, COARSE_SETS))?;
-        if left > (1.0 - FAIR_SHARE) * self.white(data, &self.null).norm_squared() {
-            return None;
+        let (left, size) = least(&self.distances(simulate, data, beside, probe, &sizes, COARSE_SETS))?;
+        let without = if beside.parts.is_empty() {
+            self.null.clone()
+        } else {
+            self.evaluate(simulate, beside, CLOSER[0])?.expectation
+        };
+        let fair = left < (1.0 - FAIR_SHARE) * self.white(data, &without).norm_squared();
+        fair.then(|| Hunt {
+            beside: beside.clone(),
+            probe,
+            left,
+            size,
+            spacing: size * (ratio - 1.0),
+        })
+    }
+
+    /// The hypothesis and the effect beside it, at the best of sizes ever closer to that of the hunt.
+    pub(super) fn hunted(
+        &self,
+        simulate: &Simulate<'_>,
+        data: &Expectation,
+        hunt: &Hunt,
+    ) -> Option<Hypothesis> {
+        let start = (hunt.size, hunt.spacing);
+        let part = self.hunt_closer(simulate, data, &hunt.beside, hunt.probe, start, &CLOSER)?;
+        Some(hunt.beside.with(&Hypothesis { parts: vec![part] }))
+    }
+
+    /// A hypothesis whose effects that jump have better sizes beside the others as they are now.
+    pub(super) fn hunt_again(
+        &self,
+        simulate: &Simulate<'_>,
+        data: &Expectation,
+        hypothesis: &Hypothesis,
+    ) -> Option<Hypothesis> {
+        /// Share of a size by which it may be off at most.
+        const OFF: f64 = 0.01;
+        let spacing = |size: f64, _: f64| OFF * size;
+        self.hunt_each(simulate, data, hypothesis, &CLOSER[1..], spacing)
+    }
+
+    /// The same within the errors of these sizes.
+    pub(super) fn hunt_about(
+        &self,
+        simulate: &Simulate<'_>,
+        data: &Expectation,
+        hypothesis: &Hypothesis,
+    ) -> Option<Hypothesis> {
+        let spacing = |_: f64, error: f64| 1.5 * error;
+        self.hunt_each(simulate, data, hypothesis, &CLOSER[..1], spacing)
+    }
+
+    fn hunt_each(
+        &self,
+        simulate: &Simulate<'_>,
+        data: &Expectation,
+        hypothesis: &Hypothesis,
+        levels: &[u64],
+        spacing: impl Fn(f64, f64) -> f64,
+    ) -> Option<Hypothesis> {
+        let mut found = hypothesis.clone();
+        for (i, part) in hypothesis.parts.iter().enumerate() {
+            let Some(error) = part.held else { continue };
+            let mut beside = found.clone();
+            beside.parts.remove(i);
+            let size = part.values[0][self.probes[part.probe].size_index()];
+            let hunt = self.hunt_closer(
+                simulate,
+                data,
+                &beside,
+                part.probe,
+                (size, spacing(size, error)),
+                levels,
+            );
+            found.parts[i] = hunt?;
         }
-        let mut spacing = best * (ratio - 1.0);
+        Some(found)
+    }
+
+    /// The best of sizes ever closer about one, from a spacing on, with more data sets from level to level.
+    fn hunt_closer(
+        &self,
+        simulate: &Simulate<'_>,
+        data: &Expectation,
+        beside: &Hypothesis,
+        probe: usize,
+        (mut best, mut spacing): (f64, f64),
+        levels: &[u64],
+    ) -> Option<Part> {
         let mut last = Vec::new();
-        for sets in CLOSER {
+        for &sets in levels {
             let sizes: Vec<f64> = (-4..=4).map(|i| best + spacing * f64::from(i) / 3.0).collect();
-            last = self.distances(simulate, data, probe, &sizes, sets);
+            last = self.distances(simulate, data, beside, probe, &sizes, sets);
             best = least(&last)?.1;
             spacing /= 3.0;
         }
@@ -39,25 +142,25 @@ impl Atlas {
             .filter(|found| found.0 < bound)
             .map(|found| (found.1 - best).abs());
         let error = as_good.fold(spacing / 2.0, f64::max);
-        let hypothesis = Hypothesis {
-            parts: vec![Part::screened(self, probe, Shape::Constant, &[best])],
-        };
-        Some(Descent::found(self, &hypothesis, error))
+        Some(Part::held(self, probe, best, error))
     }
 
-    /// Squared distances of the data from a probe at some sizes, each with its size; sizes at which the robot crashes are
-    /// left out.
+    /// Squared distances of the data from a hypothesis with a probe at some sizes beside it, each with its size; sizes at
+    /// which the robot crashes are left out.
     fn distances(
         &self,
         simulate: &Simulate<'_>,
         data: &Expectation,
+        beside: &Hypothesis,
         probe: usize,
         sizes: &[f64],
         sets: u64,
     ) -> Vec<(f64, f64)> {
         let same_draws = Expectation::mean(&self.samples[..sets as usize], true);
+        let others = beside.settings(self);
         let distance = |&size: &f64| {
-            let settings = [self.probes[probe].setting(size)];
+            let mut settings = others.clone();
+            settings.push(self.probes[probe].setting(size));
             let found = self.simulated_plainly(simulate, &settings, sets)?;
             let expected = found.moved(1.0, &same_draws, &self.null);
             Some((self.white(data, &expected).norm_squared(), size))

@@ -28,6 +28,8 @@ pub(super) struct Part {
     pub(super) per_s: f64,
     /// Factor on the steps of the probe's free numbers.
     pub(super) stride: f64,
+    /// The standard error of a size that was found by trying many: descents leave it alone.
+    pub(super) held: Option<f64>,
 }
 
 /// Effects that act together.
@@ -72,6 +74,7 @@ impl Part {
                 values: vec![clamped(sizes[0])],
                 per_s: 0.0,
                 stride: 1.0,
+                held: None,
             },
             Shape::ByRun => Self {
                 probe,
@@ -79,17 +82,17 @@ impl Part {
                 values: sizes.iter().map(|&s| clamped(s)).collect(),
                 per_s: 0.0,
                 stride: 1.0,
+                held: None,
             },
             Shape::ByTime => {
                 let per_s = sizes[1] / atlas.lap_s();
-                // The kept laps begin one and a half laps after the run, on average.
-                let middle_s = (1.5 + atlas.run_laps() as f64 / 2.0) * atlas.lap_s();
                 Self {
                     probe,
                     shape,
-                    values: vec![clamped(sizes[0] - per_s * middle_s)],
+                    values: vec![clamped(sizes[0] - per_s * middle_s(atlas))],
                     per_s,
                     stride: 1.0,
+                    held: None,
                 }
             }
         }
@@ -108,6 +111,15 @@ impl Part {
             values: vec![values],
             per_s: 0.0,
             stride: (0.3 * largest).max(1.0),
+            held: None,
+        }
+    }
+
+    /// A probe at a size that was found by trying many, to within an error.
+    pub(super) fn held(atlas: &Atlas, probe: usize, size: f64, error: f64) -> Self {
+        Self {
+            held: Some(error),
+            ..Self::screened(atlas, probe, Shape::Constant, &[size])
         }
     }
 
@@ -116,6 +128,22 @@ impl Part {
         let size = probe.size_index();
         let at_neutral = |values: &Vec<f64>| values[size] == probe.neutral;
         probe.quantum.is_some() && self.per_s == 0.0 && self.values.iter().all(at_neutral)
+    }
+
+    fn is_near(&self, other: &Self, atlas: &Atlas) -> bool {
+        let probe = &atlas.probes[self.probe];
+        let step = |i: usize| {
+            probe
+                .free
+                .iter()
+                .find(|free| free.0 == i)
+                .map_or(0.0, |free| free.1)
+        };
+        let near = |i: usize| (self.values[0][i] - other.values[0][i]).abs() <= step(i);
+        probe.spec == atlas.probes[other.probe].spec
+            && [self.shape, other.shape] == [Shape::Constant; 2]
+            && self.values[0].len() == other.values[0].len()
+            && (0..self.values[0].len()).all(near)
     }
 
     fn setting(&self, probe: &Probe) -> Setting {
@@ -142,6 +170,9 @@ impl Part {
         let count = self.values[0].len();
         let slopes = if self.shape == Shape::ByTime { count } else { 0 };
         let mut all = vec![0.0; count * self.values.len() + slopes];
+        if let Some(error) = self.held {
+            all[atlas.probes[self.probe].size_index()] = error;
+        }
         for (freedom, error) in errors.iter().filter(|(f, _)| f.part == part) {
             match freedom.parameter {
                 None => all[count + atlas.probes[self.probe].free[0].0] = *error,
@@ -158,6 +189,9 @@ impl Part {
         let probe = &atlas.probes[self.probe];
         let runs = self.values.len();
         let mut freedoms = Vec::new();
+        if self.held.is_some() {
+            return freedoms;
+        }
         for (i, &(parameter, step)) in probe.free.iter().enumerate() {
             let step = step * self.stride;
             let parameter = Some(parameter);
@@ -190,6 +224,11 @@ impl Part {
     }
 }
 
+/// Time at which a run's laps are half done: the kept ones begin one and a half laps after the run, on average.
+fn middle_s(atlas: &Atlas) -> f64 {
+    (1.5 + atlas.run_laps() as f64 / 2.0) * atlas.lap_s()
+}
+
 impl Hypothesis {
     /// The effects as the simulator takes them.
     pub(super) fn settings(&self, atlas: &Atlas) -> Vec<Setting> {
@@ -219,7 +258,7 @@ impl Hypothesis {
             Shape::ByRun => (atlas.layout.runs() > 1, atlas.layout.runs()),
             Shape::ByTime => (!atlas.probes[part.probe].drifts(), 1),
         };
-        (can && part.shape == Shape::Constant).then(|| Self {
+        (can && part.shape == Shape::Constant && part.held.is_none()).then(|| Self {
             parts: vec![Part {
                 shape,
                 values: vec![part.values[0].clone(); lists],
@@ -228,11 +267,49 @@ impl Hypothesis {
         })
     }
 
+    /// The same with the mean size of every effect whose size goes over the runs or in time; `None` if none does.
+    pub(super) fn without_patterns(&self, atlas: &Atlas) -> Option<Self> {
+        let plain = |part: &Part| {
+            let size = atlas.probes[part.probe].size_index();
+            let count = part.values.len() as f64;
+            let mean = part.values.iter().map(|values| values[size]).sum::<f64>() / count;
+            let mut values = part.values[0].clone();
+            values[size] = mean + part.per_s * middle_s(atlas);
+            Part {
+                shape: Shape::Constant,
+                values: vec![values],
+                per_s: 0.0,
+                ..part.clone()
+            }
+        };
+        let patterned = self.parts.iter().any(|part| part.shape != Shape::Constant);
+        patterned.then(|| Self {
+            parts: self.parts.iter().map(plain).collect(),
+        })
+    }
+
+    /// The same with the sizes of these parts where it has their effects at a size that was found by trying many.
+    pub(super) fn with_held(&self, known: &[Part]) -> Self {
+        let held = |part: &Part| {
+            let same = |known: &&Part| part.held.is_some() && known.probe == part.probe;
+            known.iter().find(same).unwrap_or(part).clone()
+        };
+        Self {
+            parts: self.parts.iter().map(held).collect(),
+        }
+    }
+
     /// Its probes, in order.
     pub(super) fn probes(&self) -> Vec<usize> {
         let mut probes: Vec<usize> = self.parts.iter().map(|part| part.probe).collect();
         probes.sort_unstable();
         probes
+    }
+
+    /// Whether another has the same constant effects at sizes less than a step away.
+    pub(super) fn is_near(&self, other: &Self, atlas: &Atlas) -> bool {
+        let near = |part: &Part| other.parts.iter().any(|other| part.is_near(other, atlas));
+        self.parts.len() == other.parts.len() && self.parts.iter().all(near)
     }
 
     /// This hypothesis and another together.
@@ -266,7 +343,13 @@ impl Hypothesis {
             .map_or(gain, |shape| worth(gain, shape, FAULTS))
     }
 
-    /// The numbers that a fit may change.
+    /// How many numbers were fitted, one way or another.
+    pub(super) fn fitted(&self, atlas: &Atlas) -> usize {
+        let held = self.parts.iter().filter(|part| part.held.is_some());
+        self.freedoms(atlas).len() + held.count()
+    }
+
+    /// The numbers that a descent may change.
     pub(super) fn freedoms(&self, atlas: &Atlas) -> Vec<Freedom> {
         self.parts
             .iter()

@@ -29,9 +29,10 @@ impl Atlas {
     /// The pairs of constant probes of different effects that explain a residual best, best first, each pair of probes once.
     ///
     /// Their actions are taken to add up. Looking for both at once finds what one after the other does not: the best
-    /// single explanation of two effects is often a third.
+    /// single explanation of two effects is often a third. Effects that jump are left out: their paths tell nothing.
     pub(super) fn screen_pairs(&self, residual: &White, most: usize) -> Vec<ScreenedPair> {
         let pieces: Vec<Piece> = (0..self.probes.len())
+            .filter(|&probe| !self.probes[probe].jumps)
             .flat_map(|probe| self.pieces(probe))
             .collect();
         let along = DMatrix::from_columns(&pieces.iter().map(|p| p.along.clone()).collect::<Vec<_>>());

@@ -1,6 +1,6 @@
 //! The size of a hypothesis by simulation, and how well it then explains the data.
 
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use sim::Setting;
 
@@ -21,7 +21,8 @@ pub(super) enum Round {
     Rough,
     /// The hypothesis alone; what its numbers do is taken from the rough round.
     Again,
-    /// The hypothesis and both sides, with as many data sets as sizes and their errors need.
+    /// The hypothesis and both sides, with as many data sets as sizes and their errors need; once its numbers move within
+    /// their steps, the hypothesis alone.
     Full,
 }
 
@@ -71,10 +72,16 @@ pub(super) struct Descent {
     errors: Vec<f64>,
     /// Log-likelihood gained over the declared model less the price of the fitted numbers, as the last round saw it.
     pub(super) score: f64,
-    /// What it leaves, as the last full round saw it.
+    /// What it leaves, as the last round but a rough one saw it.
     pub(super) remainder: Option<FourNumbers>,
-    /// What the rough round saw, and the moves since.
+    /// What was seen about it, and the moves since.
     near: Option<(Local, DVector<f64>)>,
+    /// How often it was looked around.
+    looks: u32,
+    /// Whether the moves stayed within the steps of the last look.
+    holds: bool,
+    /// Whether that was one of a full round.
+    full: bool,
     /// Whether there is nowhere left to descend to.
     found: bool,
 }
@@ -86,21 +93,14 @@ impl Descent {
         Self {
             hypothesis: hypothesis.clone(),
             errors: vec![f64::INFINITY; freedoms.len()],
-            freedoms,
             score: f64::NEG_INFINITY,
             remainder: None,
             near: None,
-            found: false,
-        }
-    }
-
-    /// A hypothesis whose sizes were found otherwise, each to within an error.
-    pub(super) fn found(atlas: &Atlas, hypothesis: &Hypothesis, error: f64) -> Self {
-        let start = Self::start(atlas, hypothesis);
-        Self {
-            errors: vec![error; start.freedoms.len()],
-            found: true,
-            ..start
+            looks: 0,
+            holds: false,
+            full: false,
+            found: freedoms.is_empty(),
+            freedoms,
         }
     }
 
@@ -128,13 +128,17 @@ impl Atlas {
         if descent.found {
             return Some(descent);
         }
+        let has_place = descent.hypothesis.has_place(self);
         let round = match round {
-            // A place is not found on one parabola.
-            Round::Again if descent.hypothesis.has_place(self) => Round::Rough,
+            // A place is not found on one parabola, nor a far one on two.
+            Round::Again if has_place && !(descent.holds && descent.looks > 1) => Round::Rough,
             round => round,
         };
         match (round, &descent.near) {
             (Round::Again, Some(_)) => self.look_again(simulate, data, descent),
+            (Round::Full, Some(_)) if descent.holds && descent.full && !has_place => {
+                self.look_again(simulate, data, descent)
+            }
             _ => self.look_around(simulate, data, descent, round),
         }
     }
@@ -146,14 +150,11 @@ impl Atlas {
         descent: Descent,
         round: Round,
     ) -> Option<Descent> {
-        /// Errors by which a number may still have moved in the last round, and those by which it may if the points of its
-        /// parabola lie so many times farther out.
-        const SETTLED: f64 = 0.7;
-        const WITHIN: (f64, f64) = (3.0, 4.0);
         let Descent {
             hypothesis,
             mut freedoms,
             mut errors,
+            looks,
             ..
         } = descent;
         let local = self.local(
@@ -167,11 +168,10 @@ impl Atlas {
         let left = left_of(&local.columns, &target, &moves);
         let fit = self.fit_of(data, left, &local.scatter, local.doubt);
         let hypothesis = self.with_moves(&hypothesis, &freedoms, &moves);
-        let settled = (0..moves.len()).all(|i| {
-            let (moved, error) = (moves[i].abs(), covariance[(i, i)].sqrt());
-            moved < SETTLED * error || moved < WITHIN.0 * error && WITHIN.1 * moved < freedoms[i].step
-        });
-        let remainder = (round == Round::Full).then(|| FourNumbers::new(&fit.residual, &self.layout));
+        let full = round == Round::Full;
+        let found = full && is_settled(&moves, &covariance, &freedoms);
+        let holds = are_within_steps(&moves, &freedoms);
+        let remainder = full.then(|| FourNumbers::new(&fit.residual, &self.layout));
         for (i, freedom) in freedoms.iter_mut().enumerate() {
             errors[i] = (covariance[(i, i)] * (1.0 + local.doubt.error)).sqrt();
             // The parabola should hold where the answer may lie, and be wide enough for the noise of its points not to
@@ -181,8 +181,11 @@ impl Atlas {
         }
         Some(Descent {
             score: hypothesis.worth(fit.gain) - self.price_of(&hypothesis),
-            found: round == Round::Full && settled,
             near: Some((local, moves)),
+            looks: looks + 1,
+            holds,
+            full,
+            found,
             remainder,
             hypothesis,
             freedoms,
@@ -191,21 +194,48 @@ impl Atlas {
     }
 
     fn look_again(&self, simulate: &Simulate<'_>, data: &Expectation, descent: Descent) -> Option<Descent> {
-        let (local, moved) = descent.near.as_ref()?;
+        let Descent {
+            freedoms,
+            mut errors,
+            near,
+            looks,
+            holds,
+            full,
+            ..
+        } = descent;
+        let (local, moved) = near?;
         let sets = self.enough(Round::Again.sets(1), 1);
         let center = self.evaluate(simulate, &descent.hypothesis, sets)?;
         let columns: Vec<Column> = (local.columns.iter().zip(moved.iter()))
             .map(|(column, moved)| column.from(*moved))
             .collect();
         let target = white(&local.scatter, &self.layout, data, &center.expectation);
-        let (moves, _) = nearest(&columns, &target, &descent.freedoms);
-        let hoped = target.norm_squared() - left_of(&columns, &target, &moves).norm_squared();
-        let gain = self.fit(data, &center)?.gain + 0.5 * hoped;
-        let hypothesis = self.with_moves(&descent.hypothesis, &descent.freedoms, &moves);
+        let (moves, covariance) = nearest(&columns, &target, &freedoms);
+        let left = left_of(&columns, &target, &moves);
+        let hoped = target.norm_squared() - left.norm_squared();
+        let fit = self.fit_of(data, left, &local.scatter, center.doubt);
+        let gain = if full {
+            for (i, error) in errors.iter_mut().enumerate() {
+                *error = (covariance[(i, i)] * (1.0 + center.doubt.error)).sqrt();
+            }
+            fit.gain
+        } else {
+            self.fit(data, &center)?.gain + 0.5 * hoped
+        };
+        let hypothesis = self.with_moves(&descent.hypothesis, &freedoms, &moves);
+        let found = full && is_settled(&moves, &covariance, &freedoms);
+        let moved = moved + moves;
         Some(Descent {
             score: hypothesis.worth(gain) - self.price_of(&hypothesis),
+            remainder: Some(FourNumbers::new(&fit.residual, &self.layout)),
+            holds: holds && are_within_steps(&moved, &freedoms),
+            near: Some((local, moved)),
+            looks,
+            full,
+            found,
             hypothesis,
-            ..descent
+            freedoms,
+            errors,
         })
     }
 
@@ -237,7 +267,7 @@ impl Atlas {
         );
         let fit_without = |run: usize| {
             let found = match &local {
-                Some(local) => self.fit_without(run, local, runs, hypothesis, &freedoms)?,
+                Some(local) => self.fit_without(simulate, run, local, runs, hypothesis, &freedoms)?,
                 None => hypothesis.clone(),
             };
             Ok(found.with_mean_size(run).settings(self))
@@ -247,6 +277,7 @@ impl Atlas {
 
     fn fit_without(
         &self,
+        simulate: &Simulate<'_>,
         run: usize,
         local: &Local,
         runs: &[Vec<track::Lap>],
@@ -278,7 +309,10 @@ impl Atlas {
             }
         }
         let (moves, _) = nearest(&columns, &target, freedoms);
-        Ok(self.quantised(self.with_moves(hypothesis, freedoms, &moves)))
+        let found = self.with_moves(hypothesis, freedoms, &moves);
+        // The run itself is as expected, and so has no say.
+        let hunted = self.hunt_about(simulate, &data, &found).unwrap_or(found);
+        Ok(self.quantised(hunted))
     }
 
     /// A hypothesis at its most likely sizes, simulated often enough to judge it; `None` where the robot crashes, and where
@@ -346,7 +380,7 @@ impl Atlas {
     /// What a hypothesis pays for its fitted numbers and for the choice of its probes.
     fn price_of(&self, hypothesis: &Hypothesis) -> f64 {
         let choices: f64 = hypothesis.parts.iter().map(|part| self.choice(part.probe)).sum();
-        price(hypothesis.freedoms(self).len(), self.layout.total_laps()) + choices
+        price(hypothesis.fitted(self), self.layout.total_laps()) + choices
     }
 
     /// Sizes that come in steps brought to the nearest.
@@ -362,4 +396,21 @@ impl Atlas {
         }
         hypothesis
     }
+}
+
+/// Whether numbers stayed where their parabolas were made.
+fn are_within_steps(moves: &DVector<f64>, freedoms: &[Freedom]) -> bool {
+    (moves.iter().zip(freedoms)).all(|(moved, freedom)| moved.abs() < freedom.step)
+}
+
+/// Whether numbers moved so little that there is nowhere left to go.
+fn is_settled(moves: &DVector<f64>, covariance: &DMatrix<f64>, freedoms: &[Freedom]) -> bool {
+    /// Errors by which a number may still have moved, and those by which it may if the points of its parabola lie so many
+    /// times farther out.
+    const SETTLED: f64 = 0.7;
+    const WITHIN: (f64, f64) = (3.0, 4.0);
+    (0..moves.len()).all(|i| {
+        let (moved, error) = (moves[i].abs(), covariance[(i, i)].sqrt());
+        moved < SETTLED * error || moved < WITHIN.0 * error && WITHIN.1 * moved < freedoms[i].step
+    })
 }

@@ -5,6 +5,7 @@ use rayon::prelude::*;
 
 use super::atlas::{Atlas, Simulate, White};
 use super::expectation::Expectation;
+use super::hunt::Hunt;
 use super::hypothesis::{Hypothesis, Part, Shape};
 use super::refine::{CLOSE_SETS, Descent, Round, Settled};
 use super::screen::Screened;
@@ -41,11 +42,12 @@ const ROUNDS: [(Round, f64, f64); 5] = [
     (Round::Full, 15.0, 0.004),
 ];
 
-/// The same for several effects together.
-const ROUNDS_OF_SEVERAL: [(Round, f64, f64); 5] = [
+/// The same for several effects together, of which more are tried.
+const ROUNDS_OF_SEVERAL: [(Round, f64, f64); 6] = [
     (Round::Rough, 50.0, 0.06),
     (Round::Again, 30.0, 0.02),
-    (Round::Full, 20.0, 0.006),
+    (Round::Again, 25.0, 0.006),
+    (Round::Full, 15.0, 0.004),
     (Round::Full, 15.0, 0.004),
     (Round::Full, 15.0, 0.004),
 ];
@@ -64,20 +66,62 @@ impl Search<'_> {
 
     /// Effects whose action jumps with their size, at the best of many sizes: derivatives say nothing of them.
     pub(super) fn scans(&self) -> Vec<Found> {
-        let combs = (0..self.atlas.probes.len()).filter(|&probe| self.atlas.probes[probe].jumps);
-        combs.filter_map(|probe| self.scan(probe)).collect()
+        self.jumping().filter_map(|probe| self.scan(probe)).collect()
     }
 
-    /// Whether an explanation has an effect whose action jumps with its size.
-    pub(super) fn jumps(&self, found: &Found) -> bool {
-        let parts = &found.hypothesis.parts;
-        parts.iter().any(|part| self.atlas.probes[part.probe].jumps)
+    /// Whether a hypothesis has an effect whose action jumps with its size.
+    fn jumps(&self, hypothesis: &Hypothesis) -> bool {
+        let mut parts = hypothesis.parts.iter();
+        parts.any(|part| self.atlas.probes[part.probe].jumps)
+    }
+
+    /// Whether an explanation has an effect that jumps at a size to which a descent led.
+    pub(super) fn jumped(&self, found: &Found) -> bool {
+        let held = found.hypothesis.parts.iter().all(|part| part.held.is_some());
+        self.jumps(&found.hypothesis) && !held
     }
 
     fn scan(&self, probe: usize) -> Option<Found> {
-        let found = self.atlas.hunt(self.simulate, self.data, probe)?;
-        let settled = self.atlas.settle(self.simulate, self.data, &found)?;
+        let nothing = Hypothesis { parts: Vec::new() };
+        let hunt = self.atlas.hunt(self.simulate, self.data, &nothing, probe)?;
+        let found = self.atlas.hunted(self.simulate, self.data, &hunt)?;
+        let end = Descent::start(self.atlas, &found);
+        let settled = self.atlas.settle(self.simulate, self.data, &end)?;
         Some(self.found(&settled))
+    }
+
+    /// Effects whose action jumps with their size beside the best single effects and beside either of the best pair's.
+    pub(super) fn scans_beside(&self, found: &[Found]) -> Vec<Found> {
+        const BASES: usize = 2;
+        const CLOSER: usize = 2;
+        let mut bases: Vec<Hypothesis> = Vec::new();
+        for part in found.iter().flat_map(|found| &found.hypothesis.parts) {
+            let spec = |part: &Part| self.atlas.probes[part.probe].spec;
+            let constant = part.shape == Shape::Constant;
+            if constant && bases.len() < BASES && bases.iter().all(|base| spec(&base.parts[0]) != spec(part))
+            {
+                bases.push(Hypothesis {
+                    parts: vec![part.clone()],
+                });
+            }
+        }
+        let mut hunts: Vec<Hunt> = Vec::new();
+        for base in &bases {
+            for probe in self.jumping() {
+                if self.atlas.probes[base.parts[0].probe].spec != self.atlas.probes[probe].spec {
+                    hunts.extend(self.atlas.hunt(self.simulate, self.data, base, probe));
+                }
+            }
+        }
+        hunts.sort_by(|a, b| a.left.total_cmp(&b.left));
+        let starts: Vec<Hypothesis> = (hunts.iter().take(CLOSER))
+            .filter_map(|hunt| self.atlas.hunted(self.simulate, self.data, hunt))
+            .collect();
+        self.settle(self.descend_several(&starts, f64::NEG_INFINITY))
+    }
+
+    fn jumping(&self) -> impl Iterator<Item = usize> {
+        (0..self.atlas.probes.len()).filter(|&probe| self.atlas.probes[probe].jumps)
     }
 
     /// The best single effects with sizes that go over the runs or in time, where what they leave does, tried to the end.
@@ -104,29 +148,64 @@ impl Search<'_> {
         let screened = self.atlas.screen_pairs(self.residual, PAIRS);
         let mut starts: Vec<Hypothesis> = screened.into_iter().map(|pair| pair.hypothesis).collect();
         for single in singles.iter().take(2) {
-            for start in self.beside(single) {
-                if !starts.iter().any(|other| other.probes() == start.probes()) {
-                    starts.push(start);
-                }
-            }
+            let further = self.beside(&single.hypothesis, &single.left, &starts);
+            starts.extend(further);
         }
-        self.try_rounds(starts.iter(), &ROUNDS_OF_SEVERAL)
+        let mut descents = self.descend_several(&starts, f64::NEG_INFINITY);
+        if let Some(best) = descents.iter().max_by(|a, b| a.score.total_cmp(&b.score)) {
+            let exchanged = self.exchanged(best, &starts);
+            descents.extend(self.descend_several(&exchanged, best.score));
+        }
+        self.settle(descents)
+    }
+
+    /// A pair with either effect exchanged for those that explain best what the other one leaves, but for those pairs that
+    /// were tried: actions do not quite add up, and of effects that do about the same the best few were tried.
+    fn exchanged(&self, pair: &Descent, tried: &[Hypothesis]) -> Vec<Hypothesis> {
+        const SETS: u64 = 10;
+        let parts = &pair.hypothesis.parts;
+        let mut all = tried.to_vec();
+        for kept in parts {
+            let alone = Hypothesis {
+                parts: vec![kept.clone()],
+            };
+            let Some(evaluated) = self.atlas.evaluate(self.simulate, &alone, SETS) else {
+                continue;
+            };
+            let left = self.atlas.white(self.data, &evaluated.expectation);
+            let others = self.beside(&alone, &left, &all);
+            all.extend(others);
+        }
+        all.split_off(tried.len())
     }
 
     /// The best explanation with what explains its remainder best beside it, tried to the end.
     pub(super) fn further(&self, best: &Found) -> Vec<Found> {
-        self.try_rounds(self.beside(best).iter(), &ROUNDS_OF_SEVERAL)
+        let starts = self.beside(&best.hypothesis, &best.left, &[]);
+        self.settle(self.descend_several(&starts, f64::NEG_INFINITY))
     }
 
-    /// An explanation with each of the effects that explain its remainder best.
-    fn beside(&self, start: &Found) -> Vec<Hypothesis> {
+    /// Descends from hypotheses of several effects; the best one is tried without its patterns too, which what another
+    /// effect left may have suggested.
+    fn descend_several(&self, starts: &[Hypothesis], reached: f64) -> Vec<Descent> {
+        let mut descents = self.descend(starts.iter(), &ROUNDS_OF_SEVERAL, reached);
+        let best = descents.iter().max_by(|a, b| a.score.total_cmp(&b.score));
+        let plain = best.and_then(|best| best.hypothesis.without_patterns(self.atlas));
+        descents.extend(self.descend(plain.iter(), &ROUNDS_OF_SEVERAL, reached));
+        descents
+    }
+
+    /// A hypothesis with each of the effects that explain best what it leaves, but for those that were tried and for those
+    /// that jump: [`Search::scans_beside`] is for these.
+    fn beside(&self, start: &Hypothesis, left: &White, tried: &[Hypothesis]) -> Vec<Hypothesis> {
         const FURTHER: usize = 3;
-        let screened = self.atlas.screen(&start.left);
+        let screened = self.atlas.screen(left);
         let others = self.shortlist(&screened).into_iter();
         others
-            .filter(|screened| !self.shares_effect(screened, start))
+            .filter(|screened| !self.shares_effect(screened, start) && !self.jumps(&screened.hypothesis))
+            .map(|other| start.with(&other.hypothesis))
+            .filter(|pair| !tried.iter().any(|other| other.probes() == pair.probes()))
             .take(FURTHER)
-            .map(|other| start.hypothesis.with(&other.hypothesis))
             .collect()
     }
 
@@ -162,10 +241,10 @@ impl Search<'_> {
         list
     }
 
-    fn shares_effect(&self, screened: &Screened, found: &Found) -> bool {
+    fn shares_effect(&self, screened: &Screened, start: &Hypothesis) -> bool {
         let spec = |part: &Part| self.atlas.probes[part.probe].spec;
         let own = spec(&screened.hypothesis.parts[0]);
-        found.hypothesis.parts.iter().any(|part| spec(part) == own)
+        start.parts.iter().any(|part| spec(part) == own)
     }
 
     /// Causes without a name: the groups of basis functions that explain most with fewest coefficients, tried to the end.
@@ -174,13 +253,25 @@ impl Search<'_> {
         self.try_rounds(starts.iter(), &ROUNDS_OF_GROUPS)
     }
 
-    /// Descends from every hypothesis round by round, dropping those that fall behind, then settles those that may still be
-    /// the best.
+    /// Descends from every hypothesis and settles those that may be the best.
     fn try_rounds<'h>(
         &self,
         hypotheses: impl Iterator<Item = &'h Hypothesis>,
         rounds: &[(Round, f64, f64)],
     ) -> Vec<Found> {
+        self.settle(self.descend(hypotheses, rounds, f64::NEG_INFINITY))
+    }
+
+    /// Descends from every hypothesis round by round, dropping those that fall behind the best or a score that was reached
+    /// already.
+    fn descend<'h>(
+        &self,
+        hypotheses: impl Iterator<Item = &'h Hypothesis>,
+        rounds: &[(Round, f64, f64)],
+        reached: f64,
+    ) -> Vec<Descent> {
+        /// Descents that go on where none seems to come to an end.
+        const FEW: usize = 3;
         let mut alive: Vec<Descent> = hypotheses
             .map(|start| Descent::start(self.atlas, start))
             .collect();
@@ -189,15 +280,41 @@ impl Search<'_> {
             alive = (alive.into_par_iter())
                 .filter_map(|descent| self.atlas.descend(self.simulate, self.data, descent, round))
                 .collect();
-            let best = (alive.iter().map(|d| d.score)).fold(f64::NEG_INFINITY, f64::max);
-            alive.retain(|d| d.score >= best - behind.max(share * best));
-            let first = alive.iter().find(|d| d.score == best);
-            if first.is_some_and(|first| is_hopeless(first, best - before)) {
+            alive.sort_by(|a, b| b.score.total_cmp(&a.score));
+            let Some(first) = alive.first() else {
                 break;
+            };
+            let best = first.score;
+            let hopeless = is_hopeless(first, best - before);
+            let bar = best.max(reached);
+            alive.retain(|d| d.score >= bar - behind.max(share * bar));
+            alive = self.without_repeats(alive);
+            if hopeless && round == Round::Full {
+                break;
+            }
+            if hopeless {
+                alive.truncate(FEW);
             }
             before = best;
         }
-        let settled = (alive.par_iter())
+        alive
+    }
+
+    /// Descents, best first, without those that came to where a better one is.
+    fn without_repeats(&self, sorted: Vec<Descent>) -> Vec<Descent> {
+        let mut kept: Vec<Descent> = Vec::new();
+        for descent in sorted {
+            let repeats = |better: &Descent| descent.hypothesis.is_near(&better.hypothesis, self.atlas);
+            if !kept.iter().any(repeats) {
+                kept.push(descent);
+            }
+        }
+        kept
+    }
+
+    /// The ends of descents simulated often enough to judge them, best first.
+    fn settle(&self, descents: Vec<Descent>) -> Vec<Found> {
+        let settled = (self.hunted_again(descents).par_iter())
             .filter_map(|descent| self.atlas.settle(self.simulate, self.data, descent))
             .collect();
         let mut found: Vec<Found> = (self.closer(settled).iter())
@@ -207,10 +324,32 @@ impl Search<'_> {
         found
     }
 
+    /// Descents with better sizes of the effects that jump, which were found beside others that have moved since: those of
+    /// the best descent, for all.
+    fn hunted_again(&self, descents: Vec<Descent>) -> Vec<Descent> {
+        let best = descents.iter().max_by(|a, b| a.score.total_cmp(&b.score));
+        let held = |part: &Part| part.held.is_some();
+        let several =
+            best.filter(|best| best.hypothesis.parts.len() > 1 && best.hypothesis.parts.iter().any(held));
+        let hunted =
+            several.and_then(|best| self.atlas.hunt_again(self.simulate, self.data, &best.hypothesis));
+        let Some(hunted) = hunted else {
+            return descents;
+        };
+        let known: Vec<Part> = hunted.parts.into_iter().filter(held).collect();
+        (descents.into_par_iter())
+            .filter_map(|descent| {
+                let start = Descent::start(self.atlas, &descent.hypothesis.with_held(&known));
+                self.atlas.descend(self.simulate, self.data, start, Round::Full)
+            })
+            .collect()
+    }
+
     /// Simulates the best hypothesis more often, and still more if others explain nearly as much; not if all leave far too
     /// much.
     fn closer(&self, settled: Vec<Settled>) -> Vec<Settled> {
         const CLOSE: f64 = 10.0;
+        const CLOSE_SETS_OF_ALL: u64 = 240;
         let best = (settled.iter().map(|s| s.refined.score)).fold(f64::NEG_INFINITY, f64::max);
         let leaves = |s: &Settled| FourNumbers::new(&s.refined.fit.residual, &self.atlas.layout).omnibus_p();
         let first = settled.iter().find(|s| s.refined.score == best);
@@ -219,7 +358,10 @@ impl Search<'_> {
         }
         let (close, mut others): (Vec<_>, Vec<_>) =
             (settled.into_iter()).partition(|s| s.refined.score > best - CLOSE);
-        let sets = if close.len() > 1 { CLOSE_SETS } else { FINAL_SETS };
+        let sets = match close.len() as u64 {
+            0 | 1 => FINAL_SETS,
+            rivals => (CLOSE_SETS_OF_ALL / rivals).clamp(FINAL_SETS, CLOSE_SETS),
+        };
         others.extend(self.atlas.settle_rivals(self.simulate, self.data, close, sets));
         others
     }
