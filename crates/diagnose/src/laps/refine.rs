@@ -214,19 +214,21 @@ impl Atlas {
         let left = left_of(&columns, &target, &moves);
         let hoped = target.norm_squared() - left.norm_squared();
         let fit = self.fit_of(data, left, &local.scatter, center.doubt);
-        let gain = if full {
+        let hypothesis = self.with_moves(&descent.hypothesis, &freedoms, &moves);
+        let score = if full {
             for (i, error) in errors.iter_mut().enumerate() {
                 *error = (covariance[(i, i)] * (1.0 + center.doubt.error)).sqrt();
             }
-            fit.gain
+            // Other draws would not compare with those whose numbers came to rest before.
+            descent.score
         } else {
-            self.fit(data, &center)?.gain + 0.5 * hoped
+            let gain = self.fit(data, &center)?.gain + 0.5 * hoped;
+            hypothesis.worth(gain) - self.price_of(&hypothesis)
         };
-        let hypothesis = self.with_moves(&descent.hypothesis, &freedoms, &moves);
         let found = full && is_settled(&moves, &covariance, &freedoms);
         let moved = moved + moves;
         Some(Descent {
-            score: hypothesis.worth(gain) - self.price_of(&hypothesis),
+            score,
             remainder: Some(FourNumbers::new(&fit.residual, &self.layout)),
             holds: holds && are_within_steps(&moved, &freedoms),
             near: Some((local, moved)),
