@@ -302,7 +302,7 @@ impl Study {
     }
 
     /// For each draw one run of each variant with effects added to the model, which act as in measured run `run`; `None`
-    /// where no lap is closed.
+    /// where fewer than two laps are closed, the fewest that a distance can be told of.
     ///
     /// The random streams are those of the study's own runs, so that draws differ by the effects alone.
     ///
@@ -333,9 +333,7 @@ impl Study {
             let drive = sim::drive(&scene.world(model, run)?, streams, self.laps, |_| {})?;
             progress.tick(1);
             let run = laps::simulated(name, 0, &drive, self.laps);
-            (!run.laps.is_empty())
-                .then(|| lap_cluster(name, &run))
-                .transpose()
+            (run.laps.len() > 1).then(|| lap_cluster(name, &run)).transpose()
         };
         (0..self.draws.len())
             .into_par_iter()

@@ -26,6 +26,8 @@ const AS_GOOD: f64 = 0.01;
 const ALTERNATIVE: f64 = 5.0;
 /// Log-likelihood that each number of a further effect must gain.
 const WORTH: f64 = 10.0;
+/// The same where what comes before stands without it.
+const WORTH_BESIDE: f64 = 30.0;
 /// Share of what is explained already that further effects which do not fit either must gain: at very high signal no model is
 /// exact.
 const FAULTS: f64 = 0.001;
@@ -124,11 +126,13 @@ fn explain(search: &Search<'_>, screened: &[Screened]) -> Vec<Found> {
         found.extend(search.patterns(&found));
         sort(&mut found);
     }
-    if !first_is(&found, fits) {
+    if !first_is(&found, |best| {
+        fits(best) || suffices(best) && best.share >= ALL_BUT
+    }) {
         let pairs = search.pairs(&found);
         found = preferred(found, pairs);
     }
-    if !first_is(&found, suffices) {
+    if !first_is(&found, |best| suffices(best) || best.share > MOST) {
         let beside = search.scans_beside(&found);
         found = preferred(found, beside);
     }
@@ -193,7 +197,8 @@ fn preferred(fewer: Vec<Found>, more: Vec<Found>) -> Vec<Found> {
     let numbers = count(further).saturating_sub(count(first)).max(1) as f64;
     let better = fits(b) || b.share >= ALL_BUT || !suffices(a) && b.share > a.share;
     let faults = if fits(b) { 0.0 } else { FAULTS * a.gain };
-    let wins = b.gain - a.gain > (WORTH * numbers).max(faults) && better && !heaps_noise(b);
+    let worth = if suffices(a) { WORTH_BESIDE } else { WORTH };
+    let wins = b.gain - a.gain > (worth * numbers).max(faults) && better && !heaps_noise(b);
     let (mut list, rest) = if wins { (more, fewer) } else { (fewer, more) };
     list.extend(rest);
     list

@@ -7,7 +7,7 @@ use super::expectation::Expectation;
 use super::hypothesis::{Hypothesis, Part};
 
 /// Data sets simulated at each size, at one spacing after the other.
-const CLOSER: [u64; 3] = [3, 4, 8];
+const CLOSER: [u64; 4] = [3, 4, 8, 8];
 
 /// The best of many sizes of a probe that jumps, beside a hypothesis.
 #[derive(Debug, Clone)]

@@ -152,7 +152,11 @@ impl Search<'_> {
             starts.extend(further);
         }
         let mut descents = self.descend_several(&starts, f64::NEG_INFINITY);
-        if let Some(best) = descents.iter().max_by(|a, b| a.score.total_cmp(&b.score)) {
+        let best = descents.iter().max_by(|a, b| a.score.total_cmp(&b.score));
+        // What leaves far too much lacks a third effect rather than another second one.
+        if let Some(best) =
+            best.filter(|best| !best.remainder.is_some_and(|left| left.omnibus_p() < HOPELESS_P))
+        {
             let exchanged = self.exchanged(best, &starts);
             descents.extend(self.descend_several(&exchanged, best.score));
         }
