@@ -93,7 +93,7 @@ impl Atlas {
                 let count = columns.len();
                 let part = Part::group(&self.probes[probe], probe, multiples.as_slice());
                 let score = gain - price(count, self.layout.total_laps());
-                (score, count, Hypothesis { parts: vec![part] })
+                (score, count, Hypothesis::of(part))
             })
             .collect();
         let most = found.iter().map(|f| f.0).fold(0.0, f64::max);

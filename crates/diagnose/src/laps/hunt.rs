@@ -9,28 +9,26 @@ use super::hypothesis::{Hypothesis, Part};
 /// Data sets simulated at each size, at one spacing after the other.
 const CLOSER: [u64; 4] = [3, 4, 8, 8];
 
-/// The best of many sizes of a probe that jumps, beside a hypothesis.
+/// A size of a probe that jumps, beside a hypothesis, about which a better one is to be found.
 #[derive(Debug, Clone)]
 pub(super) struct Hunt {
     beside: Hypothesis,
     probe: usize,
-    /// Squared distance that is left.
-    pub(super) left: f64,
     size: f64,
-    /// Distance of the sizes that were tried.
+    /// How far off it may be.
     spacing: f64,
 }
 
 impl Atlas {
-    /// An effect that jumps beside a hypothesis, at sizes all over its probe's range. `None` where no size explains a fair
-    /// share of what the hypothesis leaves.
+    /// An effect that jumps beside a hypothesis, at sizes all over its probe's range, and the squared distance that is left.
+    /// `None` where no size explains a fair share of what the hypothesis leaves.
     pub(super) fn hunt(
         &self,
         simulate: &Simulate<'_>,
         data: &Expectation,
         beside: &Hypothesis,
         probe: usize,
-    ) -> Option<Hunt> {
+    ) -> Option<(f64, Hunt)> {
         const COARSE: usize = 60;
         const COARSE_SETS: u64 = 1;
         const FAIR_SHARE: f64 = 0.25;
@@ -46,13 +44,13 @@ impl Atlas {
             self.evaluate(simulate, beside, CLOSER[0])?.expectation
         };
         let fair = left < (1.0 - FAIR_SHARE) * self.white(data, &without).norm_squared();
-        fair.then(|| Hunt {
+        let hunt = Hunt {
             beside: beside.clone(),
             probe,
-            left,
             size,
             spacing: size * (ratio - 1.0),
-        })
+        };
+        fair.then_some((left, hunt))
     }
 
     /// The hypothesis and the effect beside it, at the best of sizes ever closer to that of the hunt.
@@ -62,9 +60,8 @@ impl Atlas {
         data: &Expectation,
         hunt: &Hunt,
     ) -> Option<Hypothesis> {
-        let start = (hunt.size, hunt.spacing);
-        let part = self.hunt_closer(simulate, data, &hunt.beside, hunt.probe, start, &CLOSER)?;
-        Some(hunt.beside.with(&Hypothesis { parts: vec![part] }))
+        let part = self.hunt_closer(simulate, data, hunt, &CLOSER)?;
+        Some(hunt.beside.with(&Hypothesis::of(part)))
     }
 
     /// A hypothesis whose effects that jump have better sizes beside the others as they are now.
@@ -105,33 +102,30 @@ impl Atlas {
             let mut beside = found.clone();
             beside.parts.remove(i);
             let size = part.values[0][self.probes[part.probe].size_index()];
-            let hunt = self.hunt_closer(
-                simulate,
-                data,
-                &beside,
-                part.probe,
-                (size, spacing(size, error)),
-                levels,
-            );
-            found.parts[i] = hunt?;
+            let hunt = Hunt {
+                beside,
+                probe: part.probe,
+                size,
+                spacing: spacing(size, error),
+            };
+            found.parts[i] = self.hunt_closer(simulate, data, &hunt, levels)?;
         }
         Some(found)
     }
 
-    /// The best of sizes ever closer about one, from a spacing on, with more data sets from level to level.
+    /// The best of sizes ever closer about a hunt's, with so many data sets from level to level.
     fn hunt_closer(
         &self,
         simulate: &Simulate<'_>,
         data: &Expectation,
-        beside: &Hypothesis,
-        probe: usize,
-        (mut best, mut spacing): (f64, f64),
+        hunt: &Hunt,
         levels: &[u64],
     ) -> Option<Part> {
+        let (mut best, mut spacing) = (hunt.size, hunt.spacing);
         let mut last = Vec::new();
         for &sets in levels {
             let sizes: Vec<f64> = (-4..=4).map(|i| best + spacing * f64::from(i) / 3.0).collect();
-            last = self.distances(simulate, data, beside, probe, &sizes, sets);
+            last = self.distances(simulate, data, &hunt.beside, hunt.probe, &sizes, sets);
             best = least(&last)?.1;
             spacing /= 3.0;
         }
@@ -142,7 +136,7 @@ impl Atlas {
             .filter(|found| found.0 < bound)
             .map(|found| (found.1 - best).abs());
         let error = as_good.fold(spacing / 2.0, f64::max);
-        Some(Part::held(self, probe, best, error))
+        Some(Part::held(self, hunt.probe, best, error))
     }
 
     /// Squared distances of the data from a hypothesis with a probe at some sizes beside it, each with its size; sizes at

@@ -230,6 +230,11 @@ fn middle_s(atlas: &Atlas) -> f64 {
 }
 
 impl Hypothesis {
+    /// A single effect.
+    pub(super) fn of(part: Part) -> Self {
+        Self { parts: vec![part] }
+    }
+
     /// The effects as the simulator takes them.
     pub(super) fn settings(&self, atlas: &Atlas) -> Vec<Setting> {
         self.parts

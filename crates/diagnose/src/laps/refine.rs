@@ -7,7 +7,7 @@ use sim::Setting;
 use super::atlas::{Atlas, Simulate, white};
 use super::expectation::Expectation;
 use super::hypothesis::{Freedom, Hypothesis};
-use super::likelihood::Fit;
+use super::likelihood::{Doubt, Fit};
 use super::parabola::{Column, Local, left_of, nearest};
 use super::screen::price;
 use super::simulated::Evaluated;
@@ -153,7 +153,6 @@ impl Atlas {
         let Descent {
             hypothesis,
             mut freedoms,
-            mut errors,
             looks,
             ..
         } = descent;
@@ -172,8 +171,8 @@ impl Atlas {
         let found = full && is_settled(&moves, &covariance, &freedoms);
         let holds = are_within_steps(&moves, &freedoms);
         let remainder = full.then(|| FourNumbers::new(&fit.residual, &self.layout));
+        let errors = errors_of(&covariance, local.doubt);
         for (i, freedom) in freedoms.iter_mut().enumerate() {
-            errors[i] = (covariance[(i, i)] * (1.0 + local.doubt.error)).sqrt();
             // The parabola should hold where the answer may lie, and be wide enough for the noise of its points not to
             // pass for information.
             let reach = (10.0 * errors[i]).max(moves[i].abs());
@@ -216,9 +215,7 @@ impl Atlas {
         let fit = self.fit_of(data, left, &local.scatter, center.doubt);
         let hypothesis = self.with_moves(&descent.hypothesis, &freedoms, &moves);
         let score = if full {
-            for (i, error) in errors.iter_mut().enumerate() {
-                *error = (covariance[(i, i)] * (1.0 + center.doubt.error)).sqrt();
-            }
+            errors = errors_of(&covariance, center.doubt);
             // Other draws would not compare with those whose numbers came to rest before.
             descent.score
         } else {
@@ -398,6 +395,12 @@ impl Atlas {
         }
         hypothesis
     }
+}
+
+/// Standard errors of numbers with a covariance, the simulation's own error included.
+fn errors_of(covariance: &DMatrix<f64>, doubt: Doubt) -> Vec<f64> {
+    let variances = covariance.diagonal() * (1.0 + doubt.error);
+    variances.iter().map(|variance| variance.sqrt()).collect()
 }
 
 /// Whether numbers stayed where their parabolas were made.

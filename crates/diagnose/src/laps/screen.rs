@@ -143,9 +143,7 @@ impl Atlas {
         let score =
             worth(0.5 * gain, shape, FAULTS) - price(fitted, self.layout.total_laps()) - self.choice(probe);
         Some(Screened {
-            hypothesis: Hypothesis {
-                parts: vec![Part::screened(self, probe, shape, &size_at)],
-            },
+            hypothesis: Hypothesis::of(Part::screened(self, probe, shape, &size_at)),
             score,
         })
     }

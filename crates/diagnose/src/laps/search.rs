@@ -83,7 +83,7 @@ impl Search<'_> {
 
     fn scan(&self, probe: usize) -> Option<Found> {
         let nothing = Hypothesis { parts: Vec::new() };
-        let hunt = self.atlas.hunt(self.simulate, self.data, &nothing, probe)?;
+        let (_, hunt) = self.atlas.hunt(self.simulate, self.data, &nothing, probe)?;
         let found = self.atlas.hunted(self.simulate, self.data, &hunt)?;
         let end = Descent::start(self.atlas, &found);
         let settled = self.atlas.settle(self.simulate, self.data, &end)?;
@@ -100,12 +100,10 @@ impl Search<'_> {
             let constant = part.shape == Shape::Constant;
             if constant && bases.len() < BASES && bases.iter().all(|base| spec(&base.parts[0]) != spec(part))
             {
-                bases.push(Hypothesis {
-                    parts: vec![part.clone()],
-                });
+                bases.push(Hypothesis::of(part.clone()));
             }
         }
-        let mut hunts: Vec<Hunt> = Vec::new();
+        let mut hunts: Vec<(f64, Hunt)> = Vec::new();
         for base in &bases {
             for probe in self.jumping() {
                 if self.atlas.probes[base.parts[0].probe].spec != self.atlas.probes[probe].spec {
@@ -113,9 +111,9 @@ impl Search<'_> {
                 }
             }
         }
-        hunts.sort_by(|a, b| a.left.total_cmp(&b.left));
+        hunts.sort_by(|a, b| a.0.total_cmp(&b.0));
         let starts: Vec<Hypothesis> = (hunts.iter().take(CLOSER))
-            .filter_map(|hunt| self.atlas.hunted(self.simulate, self.data, hunt))
+            .filter_map(|(_, hunt)| self.atlas.hunted(self.simulate, self.data, hunt))
             .collect();
         self.settle(self.descend_several(&starts, f64::NEG_INFINITY))
     }
@@ -152,11 +150,8 @@ impl Search<'_> {
             starts.extend(further);
         }
         let mut descents = self.descend_several(&starts, f64::NEG_INFINITY);
-        let best = descents.iter().max_by(|a, b| a.score.total_cmp(&b.score));
         // What leaves far too much lacks a third effect rather than another second one.
-        if let Some(best) =
-            best.filter(|best| !best.remainder.is_some_and(|left| left.omnibus_p() < HOPELESS_P))
-        {
+        if let Some(best) = best_of(&descents).filter(|best| !leaves_far_too_much(best)) {
             let exchanged = self.exchanged(best, &starts);
             descents.extend(self.descend_several(&exchanged, best.score));
         }
@@ -170,9 +165,7 @@ impl Search<'_> {
         let parts = &pair.hypothesis.parts;
         let mut all = tried.to_vec();
         for kept in parts {
-            let alone = Hypothesis {
-                parts: vec![kept.clone()],
-            };
+            let alone = Hypothesis::of(kept.clone());
             let Some(evaluated) = self.atlas.evaluate(self.simulate, &alone, SETS) else {
                 continue;
             };
@@ -193,7 +186,7 @@ impl Search<'_> {
     /// effect left may have suggested.
     fn descend_several(&self, starts: &[Hypothesis], reached: f64) -> Vec<Descent> {
         let mut descents = self.descend(starts.iter(), &ROUNDS_OF_SEVERAL, reached);
-        let best = descents.iter().max_by(|a, b| a.score.total_cmp(&b.score));
+        let best = best_of(&descents);
         let plain = best.and_then(|best| best.hypothesis.without_patterns(self.atlas));
         descents.extend(self.descend(plain.iter(), &ROUNDS_OF_SEVERAL, reached));
         descents
@@ -331,7 +324,7 @@ impl Search<'_> {
     /// Descents with better sizes of the effects that jump, which were found beside others that have moved since: those of
     /// the best descent, for all.
     fn hunted_again(&self, descents: Vec<Descent>) -> Vec<Descent> {
-        let best = descents.iter().max_by(|a, b| a.score.total_cmp(&b.score));
+        let best = best_of(&descents);
         let held = |part: &Part| part.held.is_some();
         let several =
             best.filter(|best| best.hypothesis.parts.len() > 1 && best.hypothesis.parts.iter().any(held));
@@ -410,8 +403,17 @@ impl Search<'_> {
 /// Whether the best descent leaves far too much and does not get on: more rounds would not make an answer of it.
 fn is_hopeless(descent: &Descent, progress: f64) -> bool {
     const SLOW: f64 = 0.1;
-    (descent.remainder)
-        .is_some_and(|left| left.omnibus_p() < HOPELESS_P && progress < SLOW * 0.5 * left.excess())
+    leaves_far_too_much(descent)
+        && (descent.remainder).is_some_and(|left| progress < SLOW * 0.5 * left.excess())
+}
+
+fn leaves_far_too_much(descent: &Descent) -> bool {
+    (descent.remainder).is_some_and(|left| left.omnibus_p() < HOPELESS_P)
+}
+
+/// The descent with the best score.
+fn best_of(descents: &[Descent]) -> Option<&Descent> {
+    descents.iter().max_by(|a, b| a.score.total_cmp(&b.score))
 }
 
 /// Best first.
