@@ -1,5 +1,5 @@
-//! One control step of both controllers against 15 to 1000 segments, with one ray per sensor and with many; a lap; and
-//! what it costs to cut a circuit and to make a variant of it.
+//! One control step of both controllers against 15 to 1000 segments, with one ray per sensor and with many; with effects
+//! that drift; and what it costs to cut a circuit and to make a variant of it.
 
 mod ground;
 
@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use criterion::Criterion;
 use ground::{braitenberg, circuit, model, rule_based};
-use sim::{Beam, Circuit, Combine, Model, Run, Scene, Streams, max_error_for};
+use sim::{Beam, Circuit, Combine, Model, Pattern, Run, Scene, Setting, Streams, max_error_for};
 
 fn main() {
     let mut criterion = Criterion::default().configure_from_args();
@@ -39,7 +39,30 @@ fn main() {
             &wide,
         );
     }
+    for name in ["reading-gain", "sensor-reach", "outer-wall-offset"] {
+        let mut drifting = model(braitenberg(), 0.005);
+        drifting.effects.push(by_time(name));
+        step(
+            &mut criterion,
+            &format!("step/by-time/{name}"),
+            &circuit,
+            &drifting,
+        );
+    }
     criterion.final_summary();
+}
+
+/// An effect with one parameter that moves away from its neutral value by a millionth a second.
+fn by_time(name: &str) -> Setting {
+    let spec = sim::find(name).expect("a name of the registry");
+    let start = vec![spec.params[0].neutral.expect("a size")];
+    Setting {
+        spec,
+        pattern: Pattern::ByTime {
+            start,
+            per_s: vec![1e-6],
+        },
+    }
 }
 
 fn step(criterion: &mut Criterion, name: &str, circuit: &Arc<Circuit>, model: &Model) {

@@ -4,11 +4,11 @@ use std::sync::Arc;
 
 use track::Vec2;
 
+use crate::apparatus::Apparatus;
 use crate::cast::LANES;
-use crate::effects::{Active, Moment, Stage};
-use crate::outlook::{Look, Outlook, See};
-use crate::run::{Sight, sights};
-use crate::world::{Geometry, World, altered};
+use crate::effects::{Active, Moment};
+use crate::outlook::{Look, Outlook};
+use crate::world::World;
 use crate::{Error, Machine, Pose, Readings, Setting, WheelSpeeds};
 
 /// A 3 x 3 matrix over x (m), y (m) and heading (rad), row by row.
@@ -30,21 +30,13 @@ pub struct Motion {
 #[derive(Debug)]
 pub struct Forecast<'w> {
     world: &'w World<'w>,
-    geometry: Arc<Geometry>,
-    machine: Machine,
-    sights: Vec<Sight>,
-    effects: Vec<Active>,
-    /// Effects whose displacement of the walls is not in the geometry.
-    displacing: Vec<Active>,
-    drifting: bool,
-    weighs_rays: bool,
+    apparatus: Apparatus<'w>,
     /// Whether rays go otherwise than in the world without the further effects, and whether they answer otherwise.
     recasts: bool,
     responds: bool,
     /// What comes through of a small change of the readings; `None` for all of it.
     through: Option<[[f64; LANES]; LANES]>,
     now: Moment,
-    ticks: u64,
 }
 
 impl<'w> Forecast<'w> {
@@ -68,25 +60,11 @@ impl<'w> Forecast<'w> {
             .iter()
             .enumerate()
             .try_for_each(|(i, setting)| setting.check(i))?;
-        let settings: Vec<Setting> = world.model.effects.iter().chain(further).cloned().collect();
-        let effects = Active::all(&settings, world.run)?;
-        let moving: Vec<Setting> = further
-            .iter()
-            .filter(|s| s.spec.stage == Stage::World)
-            .cloned()
-            .collect();
-        let machine = altered(&world.model.machine, &effects);
         let mut forecast = Self {
             world,
-            geometry: Arc::clone(&world.geometry),
-            sights: sights(&machine),
+            apparatus: Apparatus::new(world, further)?,
             recasts: false,
             responds: false,
-            displacing: Active::all(&moving, world.run)?,
-            machine,
-            drifting: effects.iter().any(Active::drifts),
-            weighs_rays: effects.iter().any(|active| active.effect.weighs_rays()),
-            effects,
             through: None,
             now: Moment {
                 time_s: 0.0,
@@ -97,7 +75,6 @@ impl<'w> Forecast<'w> {
                 gate_count: world.circuit().gates.len(),
                 arena_middle: world.arena_middle(),
             },
-            ticks: 0,
         };
         forecast.compare(world)?;
         Ok(forecast)
@@ -117,15 +94,15 @@ impl<'w> Forecast<'w> {
     fn compare(&mut self, other: &World<'_>) -> Result<(), Error> {
         let weighs = |active: &Active| active.effect.weighs_rays();
         let others = Active::all(&other.model.effects, other.run)?;
-        let (mine, theirs) = (&self.machine, &other.machine);
-        self.recasts = self.drifting
-            || !Arc::ptr_eq(&self.geometry, &other.geometry)
+        let (mine, theirs) = (&self.apparatus.machine, &other.machine);
+        self.recasts = self.apparatus.drifts()
+            || !Arc::ptr_eq(&self.apparatus.geometry, &other.geometry)
             || mine.mounts != theirs.mounts
             || mine.beam != theirs.beam
             || mine.beam.rays().len() > 1;
-        self.responds = self.weighs_rays
+        self.responds = self.apparatus.weighs_rays
             || others.iter().any(weighs)
-            || !self.displacing.is_empty()
+            || !self.apparatus.displacing.is_empty()
             || mine.range_m != theirs.range_m
             || mine.response != theirs.response;
         Ok(())
@@ -133,38 +110,25 @@ impl<'w> Forecast<'w> {
 
     /// The machine's constants as they are now.
     pub fn machine(&self) -> &Machine {
-        &self.machine
+        &self.apparatus.machine
     }
 
     /// Goes to the control step that begins at `time_s`, seconds since the run began.
     pub fn tick(&mut self, time_s: f64) {
         self.now.time_s = time_s;
-        if self.drifting {
-            self.effects
-                .iter_mut()
-                .chain(&mut self.displacing)
-                .for_each(|active| active.advance(time_s));
-            self.machine = altered(&self.world.model.machine, &self.effects);
-            self.sights = sights(&self.machine);
-            // As seldom as a run does it.
-            const TICKS_BETWEEN_CUTS: u64 = 64;
-            if self.ticks.is_multiple_of(TICKS_BETWEEN_CUTS) {
-                self.geometry = self.world.scene.geometry(&self.effects, &self.machine);
-            }
-        }
-        self.ticks += 1;
+        self.apparatus.advance(time_s);
     }
 
     /// Where the camera sees a pose, before its noise, m.
     pub fn observed(&self, pose: Pose) -> Vec2 {
         let now = Moment { pose, ..self.now };
         let see = |position, active: &Active| active.effect.observed(&active.values, &now, position);
-        self.effects.iter().fold(pose.position, see)
+        self.apparatus.effects.iter().fold(pose.position, see)
     }
 
     /// Expected readings at a pose with this covariance, to second order in the distance.
     pub fn readings(&mut self, pose: Pose, covariance: &PoseMatrix) -> Outlook {
-        let mut outlook = self.see().outlook(pose, covariance);
+        let mut outlook = self.apparatus.outlook(pose, covariance);
         self.change_readings(pose, &mut outlook.mean);
         if let Some(through) = &self.through {
             let slope = outlook.slope;
@@ -182,26 +146,14 @@ impl<'w> Forecast<'w> {
     /// the further effects turn them.
     pub fn readings_beside(&mut self, pose: Pose, covariance: &PoseMatrix, look: &Look) -> Readings {
         let mut readings = if self.recasts {
-            self.see().outlook(pose, covariance).mean
+            self.apparatus.outlook(pose, covariance).mean
         } else if self.responds {
-            self.see().responses_again(look)
+            self.apparatus.responses_again(look)
         } else {
             look.response()
         };
         self.change_readings(pose, &mut readings);
         readings
-    }
-
-    fn see(&self) -> See<'_> {
-        See {
-            scene: self.world.scene,
-            geometry: &self.geometry,
-            machine: &self.machine,
-            sights: &self.sights,
-            effects: &self.effects,
-            weighs_rays: self.weighs_rays,
-            displacing: &self.displacing,
-        }
     }
 
     /// What effects make of the readings.
@@ -211,10 +163,10 @@ impl<'w> Forecast<'w> {
             step_s: self.world.rules().control_step_s,
             ..self.now
         };
-        for active in &mut self.effects {
+        for active in &mut self.apparatus.effects {
             active
                 .effect
-                .readings(&active.values, &now, &self.machine, readings);
+                .readings(&active.values, &now, &self.apparatus.machine, readings);
         }
     }
 
@@ -265,8 +217,8 @@ impl<'w> Forecast<'w> {
             now.time_s = start_s + f64::from(k) * step_s;
             now.pose = at;
             let ground = self.ground(&now);
-            let mut twist = self.machine.robot.twist(ground);
-            for active in &mut self.effects {
+            let mut twist = self.apparatus.machine.robot.twist(ground);
+            for active in &mut self.apparatus.effects {
                 twist = active.effect.twist(&active.values, &now, twist);
             }
             let next = at.advance(twist, step_s);
@@ -278,6 +230,7 @@ impl<'w> Forecast<'w> {
                 ground,
             );
             let drift: Vec2 = self
+                .apparatus
                 .effects
                 .iter()
                 .map(|active| active.effect.drift_m_s(&active.values, &now) * step_s)
@@ -294,10 +247,10 @@ impl<'w> Forecast<'w> {
     /// Speeds of the wheels over the ground without slip.
     fn ground(&mut self, now: &Moment) -> WheelSpeeds {
         let mut wheels = now.command;
-        for active in &mut self.effects {
+        for active in &mut self.apparatus.effects {
             wheels = active.effect.drive(&active.values, now, wheels);
         }
-        for active in &mut self.effects {
+        for active in &mut self.apparatus.effects {
             wheels = active.effect.ground(&active.values, now, wheels);
         }
         wheels
@@ -305,12 +258,12 @@ impl<'w> Forecast<'w> {
 
     /// What uniform slip of each wheel in each physics step adds up to at the step's end.
     fn slip_covariance(&self, pushes: &[(Pose, WheelSpeeds)], end: Vec2, step_s: f64) -> PoseMatrix {
-        let level = self.machine.slip_level;
+        let level = self.apparatus.machine.slip_level;
         let mut covariance = [[0.0; 3]; 3];
         for (half, ground) in pushes {
             let arm = (end - half.position).perp();
             for (speed_m_s, sign) in [(ground.left_m_s, -1.0), (ground.right_m_s, 1.0)] {
-                let yaw = sign * step_s / self.machine.robot.axle_m;
+                let yaw = sign * step_s / self.apparatus.machine.robot.axle_m;
                 let way = half.heading * (0.5 * step_s) + arm * yaw;
                 let push = [way.x, way.y, yaw];
                 let variance = (level * speed_m_s).powi(2) / 3.0;
@@ -338,7 +291,7 @@ impl<'w> Forecast<'w> {
                 for active in &mut effects {
                     active
                         .effect
-                        .readings(&active.values, &self.now, &self.machine, &mut readings);
+                        .readings(&active.values, &self.now, &self.apparatus.machine, &mut readings);
                 }
             }
             Ok(readings)

@@ -5,6 +5,7 @@
 //! in (nothing in it changes, so threads share it), a [`Run`] everything that changes. The tick has five stages,
 //! always in this order: sense, decide, act, move, observe.
 
+mod apparatus;
 mod cast;
 mod controller;
 mod cut;

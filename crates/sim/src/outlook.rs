@@ -1,11 +1,10 @@
 //! What the sensors should read at a pose that is known up to a covariance.
 
+use crate::apparatus::Apparatus;
 use crate::cast::{Hits, LANES, Rays};
-use crate::effects::{Active, Hit};
+use crate::effects::Hit;
 use crate::forecast::PoseMatrix;
-use crate::run::Sight;
-use crate::world::{Geometry, Scene};
-use crate::{Combine, Machine, Pose, Readings, Response};
+use crate::{Combine, Pose, Readings, Response};
 
 /// What the sensors should read at an uncertain pose, before noise and cut.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -33,18 +32,6 @@ pub struct Look {
     response: Readings,
 }
 
-/// All that one look at the walls needs.
-pub(crate) struct See<'a> {
-    pub(crate) scene: &'a Scene,
-    pub(crate) geometry: &'a Geometry,
-    pub(crate) machine: &'a Machine,
-    pub(crate) sights: &'a [Sight],
-    pub(crate) effects: &'a [Active],
-    pub(crate) weighs_rays: bool,
-    /// Effects whose displacement of the walls is not in the geometry.
-    pub(crate) displacing: &'a [Active],
-}
-
 /// One ray of one sensor: its distance, how that changes with the pose, its standard deviation, and what effects make
 /// of its response.
 #[derive(Clone, Copy)]
@@ -55,7 +42,7 @@ struct Glance {
     factor: f64,
 }
 
-impl See<'_> {
+impl Apparatus<'_> {
     /// The responses of all sensors, before effects on readings.
     pub(crate) fn outlook(&self, pose: Pose, covariance: &PoseMatrix) -> Outlook {
         let mut outlook = Outlook {
@@ -136,7 +123,7 @@ impl See<'_> {
             sensor: lane,
             distance_m,
             cos_incidence: towards.abs().min(1.0),
-            site: self.scene.site(place),
+            site: self.world.scene.site(place),
         };
         let factor = self
             .effects

@@ -1,14 +1,13 @@
 //! One robot driving: sense, decide, act, move, observe.
 
-use std::sync::Arc;
-
 use track::{Lap, LapTracker, Vec2, Way};
 
+use crate::apparatus::{Apparatus, Sight};
 use crate::cast::{Hits, LANES, Rays};
-use crate::effects::{Active, Hit, Moment};
+use crate::effects::{Hit, Moment};
 use crate::noise::{Stream, Streams};
 use crate::sensor::Combine;
-use crate::world::{Geometry, World, altered};
+use crate::world::World;
 use crate::{Error, Machine, Pose, Readings, WheelSpeeds};
 
 /// What one control step tells: the row of a run's file.
@@ -28,12 +27,7 @@ pub struct Step {
 #[derive(Debug)]
 pub struct Run<'w> {
     world: &'w World<'w>,
-    geometry: Arc<Geometry>,
-    machine: Machine,
-    sights: Vec<Sight>,
-    effects: Vec<Active>,
-    drifting: bool,
-    weighs_rays: bool,
+    apparatus: Apparatus<'w>,
     pose: Pose,
     command: WheelSpeeds,
     steps: u64,
@@ -43,13 +37,6 @@ pub struct Run<'w> {
     slip: Stream,
     sense: Stream,
     camera: Stream,
-}
-
-/// The rays that one ray of the beam makes on all eight sensors, in the body frame.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Sight {
-    pub(crate) rays: Rays,
-    pub(crate) weight: f64,
 }
 
 impl<'w> Run<'w> {
@@ -68,15 +55,9 @@ impl<'w> Run<'w> {
         let forward = world.forward(gate);
         let center = gates[gate].center + gates[gate].left * offset_m;
         let pose = Pose::new(center.x, center.y, forward.y.atan2(forward.x) + turn_rad);
-        let effects = Active::all(&world.model.effects, world.run)?;
         let mut run = Self {
             world,
-            geometry: Arc::clone(&world.geometry),
-            machine: world.machine.clone(),
-            sights: sights(&world.machine),
-            drifting: effects.iter().any(Active::drifts),
-            weighs_rays: effects.iter().any(|active| active.effect.weighs_rays()),
-            effects,
+            apparatus: Apparatus::new(world, &[])?,
             pose,
             command: WheelSpeeds::default(),
             steps: 0,
@@ -104,9 +85,7 @@ impl<'w> Run<'w> {
     /// Drives for one control step.
     pub fn step(&mut self) -> Step {
         let time_s = self.steps as f64 * self.world.rules().control_step_s;
-        if self.drifting {
-            self.drift(time_s);
-        }
+        self.apparatus.advance(time_s);
         let mut now = Moment {
             time_s,
             step_s: self.world.rules().control_step_s,
@@ -119,9 +98,10 @@ impl<'w> Run<'w> {
         let observed = self.observe(&now);
         let readings = self.sense(&now);
         now.command = self
+            .apparatus
             .machine
             .robot
-            .limit(self.machine.controller.command(&readings));
+            .limit(self.apparatus.machine.controller.command(&readings));
         self.command = now.command;
         self.act(now);
         self.steps += 1;
@@ -133,25 +113,17 @@ impl<'w> Run<'w> {
         }
     }
 
-    /// Brings the values that change in time, and what depends on them, up to date.
-    fn drift(&mut self, time_s: f64) {
-        self.effects.iter_mut().for_each(|active| active.advance(time_s));
-        self.machine = altered(&self.world.model.machine, &self.effects);
-        self.sights = sights(&self.machine);
-        // Walls are cut anew only a few times in a lap: they move by micrometres in that time.
-        const STEPS_BETWEEN_CUTS: u64 = 64;
-        if self.steps.is_multiple_of(STEPS_BETWEEN_CUTS) {
-            self.geometry = self.world.scene.geometry(&self.effects, &self.machine);
-        }
-    }
-
     /// Where the camera sees the robot.
     #[inline]
     fn observe(&mut self, now: &Moment) -> Vec2 {
-        let seen = self.effects.iter().fold(self.pose.position, |position, active| {
-            active.effect.observed(&active.values, now, position)
-        });
-        let noise_m = self.machine.camera_noise_m;
+        let seen = self
+            .apparatus
+            .effects
+            .iter()
+            .fold(self.pose.position, |position, active| {
+                active.effect.observed(&active.values, now, position)
+            });
+        let noise_m = self.apparatus.machine.camera_noise_m;
         let (x, y) = (self.camera.normal(), self.camera.normal());
         seen + Vec2::new(x, y) * noise_m
     }
@@ -162,26 +134,26 @@ impl<'w> Run<'w> {
         // Drawn first: the processor casts the rays meanwhile.
         let normals: Readings = std::array::from_fn(|_| self.sense.normal());
         let mut readings = self.responses();
-        for active in &mut self.effects {
+        for active in &mut self.apparatus.effects {
             active
                 .effect
-                .readings(&active.values, now, &self.machine, &mut readings);
+                .readings(&active.values, now, &self.apparatus.machine, &mut readings);
         }
-        let noise = self.machine.noise;
+        let noise = self.apparatus.machine.noise;
         for (reading, normal) in readings.iter_mut().zip(normals) {
             *reading += noise.deviation(*reading) * normal;
         }
-        for active in &mut self.effects {
+        for active in &mut self.apparatus.effects {
             active.effect.noisy_readings(&active.values, &mut readings);
         }
-        let full_scale = self.machine.full_scale_counts;
+        let full_scale = self.apparatus.machine.full_scale_counts;
         readings.map(|reading| reading.clamp(0.0, full_scale))
     }
 
     /// The response of each sensor to what its rays meet.
     #[inline]
     fn responses(&self) -> Readings {
-        match self.machine.beam.combine {
+        match self.apparatus.machine.beam.combine {
             Combine::Responses => self.mean_response(),
             Combine::Distances => self.response_of_mean_distance(),
         }
@@ -192,15 +164,15 @@ impl<'w> Run<'w> {
     fn mean_response(&self) -> Readings {
         let Machine {
             range_m, response, ..
-        } = &self.machine;
+        } = &self.apparatus.machine;
         let mut total = [0.0; LANES];
-        for sight in &self.sights {
+        for sight in &self.apparatus.sights {
             let (rays, hits) = self.look(sight);
             let mut values = response.readings(&hits.distance_m);
             for (value, distance_m) in values.iter_mut().zip(hits.distance_m) {
                 *value = if distance_m <= *range_m { *value } else { 0.0 };
             }
-            if self.weighs_rays {
+            if self.apparatus.weighs_rays {
                 for lane in (0..LANES).filter(|&lane| hits.distance_m[lane] <= *range_m) {
                     values[lane] *= self.ray_factor(&rays, &hits, lane);
                 }
@@ -217,14 +189,14 @@ impl<'w> Run<'w> {
     fn response_of_mean_distance(&self) -> Readings {
         let Machine {
             range_m, response, ..
-        } = &self.machine;
+        } = &self.apparatus.machine;
         let (mut mean, mut factor) = ([0.0; LANES], [1.0; LANES]);
-        for sight in &self.sights {
+        for sight in &self.apparatus.sights {
             let (rays, hits) = self.look(sight);
             for (mean, d) in mean.iter_mut().zip(hits.distance_m) {
                 *mean += sight.weight * d.min(*range_m);
             }
-            if self.weighs_rays {
+            if self.apparatus.weighs_rays {
                 for lane in (0..LANES).filter(|&lane| hits.distance_m[lane] <= *range_m) {
                     factor[lane] += sight.weight * (self.ray_factor(&rays, &hits, lane) - 1.0);
                 }
@@ -240,16 +212,17 @@ impl<'w> Run<'w> {
     #[inline]
     fn look(&self, sight: &Sight) -> (Rays, Hits) {
         let rays = sight.rays.placed(self.pose);
-        let hits = self
-            .geometry
-            .caster
-            .cast(&self.geometry.walls, self.pose.position, &rays);
+        let hits =
+            self.apparatus
+                .geometry
+                .caster
+                .cast(&self.apparatus.geometry.walls, self.pose.position, &rays);
         (rays, hits)
     }
 
     /// What the effects make of one ray's response.
     fn ray_factor(&self, rays: &Rays, hits: &Hits, lane: usize) -> f64 {
-        let (walls, segment) = (&self.geometry.walls, hits.segment[lane] as usize);
+        let (walls, segment) = (&self.apparatus.geometry.walls, hits.segment[lane] as usize);
         let direction = rays.direction(lane);
         let place = walls.place(segment, rays.origin(lane) + direction * hits.distance_m[lane]);
         let hit = Hit {
@@ -258,7 +231,8 @@ impl<'w> Run<'w> {
             cos_incidence: walls.normal(segment).dot(direction).abs().min(1.0),
             site: self.world.scene.site(place),
         };
-        self.effects
+        self.apparatus
+            .effects
             .iter()
             .map(|active| active.effect.ray_factor(&active.values, &hit))
             .product()
@@ -275,12 +249,12 @@ impl<'w> Run<'w> {
             now.time_s = start_s + f64::from(k) * step_s;
             now.pose = self.pose;
             let ground = self.ground(&now);
-            let mut twist = self.machine.robot.twist(ground);
-            for active in &mut self.effects {
+            let mut twist = self.apparatus.machine.robot.twist(ground);
+            for active in &mut self.apparatus.effects {
                 twist = active.effect.twist(&active.values, &now, twist);
             }
             self.pose = self.pose.advance(twist, step_s);
-            for active in &self.effects {
+            for active in &self.apparatus.effects {
                 self.pose.position += active.effect.drift_m_s(&active.values, &now) * step_s;
             }
             self.touch();
@@ -293,16 +267,16 @@ impl<'w> Run<'w> {
     fn ground(&mut self, now: &Moment) -> WheelSpeeds {
         let mut wheels = now.command;
         let mut draws = [self.slip.symmetric(), self.slip.symmetric()];
-        for active in &mut self.effects {
+        for active in &mut self.apparatus.effects {
             wheels = active.effect.drive(&active.values, now, wheels);
             draws = active.effect.slip(&active.values, draws);
         }
-        let level = self.machine.slip_level;
+        let level = self.apparatus.machine.slip_level;
         let mut ground = WheelSpeeds {
             left_m_s: wheels.left_m_s * (1.0 + level * draws[0]),
             right_m_s: wheels.right_m_s * (1.0 + level * draws[1]),
         };
-        for active in &mut self.effects {
+        for active in &mut self.apparatus.effects {
             ground = active.effect.ground(&active.values, now, ground);
         }
         ground
@@ -313,13 +287,13 @@ impl<'w> Run<'w> {
     fn touch(&mut self) {
         // Two walls at an acute corner push in turn; a body that fits is free after a few.
         const MOST_PUSHES: usize = 32;
-        let radius_m = self.machine.robot.body_radius_m;
+        let radius_m = self.apparatus.machine.robot.body_radius_m;
         for push in 0..MOST_PUSHES {
-            let Some(point) =
-                self.geometry
-                    .contact
-                    .nearest_within(&self.geometry.walls, self.pose.position, radius_m)
-            else {
+            let Some(point) = self.apparatus.geometry.contact.nearest_within(
+                &self.apparatus.geometry.walls,
+                self.pose.position,
+                radius_m,
+            ) else {
                 return;
             };
             self.contacts += u64::from(push == 0);
@@ -350,20 +324,6 @@ impl<'w> Run<'w> {
         self.sense.enter(self.stretch);
         self.camera.enter(self.stretch);
     }
-}
-
-/// The beam of all sensors, ray by ray.
-pub(crate) fn sights(machine: &Machine) -> Vec<Sight> {
-    let axes = machine
-        .mounts
-        .map(|mount| Vec2::new(mount.angle_rad.cos(), mount.angle_rad.sin()));
-    let sight = |&(turn, weight): &(Vec2, f64)| Sight {
-        rays: Rays::new(std::array::from_fn(|i| {
-            (machine.mounts[i].position, axes[i].rotate(turn))
-        })),
-        weight,
-    };
-    machine.beam.rays().iter().map(sight).collect()
 }
 
 /// The laps of one run.

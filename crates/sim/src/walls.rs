@@ -100,6 +100,16 @@ impl Walls {
         }
     }
 
+    /// How far a vertex lies at most from where the same vertex is in other walls, m; infinite where these have others.
+    pub(crate) fn farthest_moved_m(&self, other: &Self) -> f64 {
+        if self.pieces != other.pieces {
+            return f64::INFINITY;
+        }
+        (0..self.x_m.len())
+            .map(|i| self.vertex(i).distance(other.vertex(i)))
+            .fold(0.0, f64::max)
+    }
+
     /// Number of straight pieces.
     pub fn len(&self) -> usize {
         self.pieces.iter().flatten().count()

@@ -34,22 +34,51 @@ pub(crate) struct Geometry {
     pub(crate) walls: Walls,
     pub(crate) caster: Caster,
     pub(crate) contact: Cells,
+    /// How far the rays go, m.
+    pub(crate) range_m: f64,
+    /// The walls that the caster and the cells were made for, where they have room for walls that moved.
+    made_for: Option<Arc<Walls>>,
 }
+
+/// How far walls that drift, and the range, may go before casters are made anew, m.
+const ROOM_M: f64 = 0.002;
 
 impl Geometry {
     fn new(walls: Walls, kind: Option<CasterKind>, machine: &Machine) -> Self {
+        Self::with_room(walls, kind, machine, 0.0)
+    }
+
+    fn with_room(walls: Walls, kind: Option<CasterKind>, machine: &Machine, room_m: f64) -> Self {
         let spread_m = machine
             .mounts
             .iter()
             .map(|mount| mount.position.length())
             .fold(0.0, f64::max);
-        let caster = Caster::new(kind, &walls, machine.range_m, spread_m + 1e-9);
-        let contact = Cells::new(&walls, machine.robot.body_radius_m);
+        let range_m = machine.range_m + room_m;
+        let caster = Caster::new(kind, &walls, range_m, spread_m + room_m + 1e-9);
+        let contact = Cells::new(&walls, machine.robot.body_radius_m + room_m);
         Self {
+            made_for: (room_m > 0.0).then(|| Arc::new(walls.clone())),
             walls,
             caster,
             contact,
+            range_m,
         }
+    }
+
+    /// The same with walls that moved within its room; `None` where they or the range went farther.
+    fn moved(&self, walls: &Walls, machine: &Machine) -> Option<Self> {
+        let made_for = self.made_for.as_ref()?;
+        if machine.range_m > self.range_m || walls.farthest_moved_m(made_for) > ROOM_M {
+            return None;
+        }
+        Some(Self {
+            walls: walls.clone(),
+            caster: self.caster.over(walls)?,
+            contact: self.contact.clone(),
+            range_m: self.range_m,
+            made_for: self.made_for.clone(),
+        })
     }
 }
 
@@ -61,7 +90,6 @@ pub struct Scene {
     kind: Option<CasterKind>,
     outer: Chain,
     inner: Chain,
-    range_m: f64,
     body_radius_m: f64,
     declared: Arc<Geometry>,
 }
@@ -89,16 +117,13 @@ impl Scene {
         let inner = circuit.course.inner.flatten(model.wall.max_error_m)?;
         let walls = Walls::new(&outer, &inner, model.wall.thickness_m);
         let declared = Arc::new(Geometry::new(walls, caster, &model.machine));
-        let Machine { range_m, robot, .. } = &model.machine;
-        let (range_m, body_radius_m) = (*range_m, robot.body_radius_m);
         Ok(Self {
             circuit,
             rules: model.wall,
             kind: caster,
             outer,
             inner,
-            range_m,
-            body_radius_m,
+            body_radius_m: model.machine.robot.body_radius_m,
             declared,
         })
     }
@@ -107,11 +132,9 @@ impl Scene {
     pub fn recut(&self, model: &Model, outer: Chain, inner: Chain) -> Self {
         let walls = Walls::new(&outer, &inner, self.rules.thickness_m);
         let declared = Arc::new(Geometry::new(walls, self.kind, &model.machine));
-        let range_m = model.machine.range_m;
         Self {
             outer,
             inner,
-            range_m,
             declared,
             ..self.clone()
         }
@@ -163,20 +186,38 @@ impl Scene {
 
     /// The walls as the effects move them.
     pub(crate) fn geometry(&self, effects: &[Active], machine: &Machine) -> Arc<Geometry> {
+        match self.walls_moved(effects, machine) {
+            Some(walls) => Arc::new(Geometry::new(walls, self.kind, machine)),
+            None => Arc::clone(&self.declared),
+        }
+    }
+
+    /// The walls as effects that drift move them now, from what they were a while before.
+    pub(crate) fn geometry_from(
+        &self,
+        before: &Geometry,
+        effects: &[Active],
+        machine: &Machine,
+    ) -> Arc<Geometry> {
+        let Some(walls) = self.walls_moved(effects, machine) else {
+            return Arc::clone(&self.declared);
+        };
+        let moved = before.moved(&walls, machine);
+        Arc::new(moved.unwrap_or_else(|| Geometry::with_room(walls, self.kind, machine, ROOM_M)))
+    }
+
+    /// The walls where effects move them; `None` where the declared geometry does.
+    fn walls_moved(&self, effects: &[Active], machine: &Machine) -> Option<Walls> {
         let outer = self.moved(Side::Outer, effects);
         let inner = self.moved(Side::Inner, effects);
-        if outer.is_none() && inner.is_none() && machine.range_m <= self.range_m {
-            return Arc::clone(&self.declared);
+        if outer.is_none() && inner.is_none() && machine.range_m <= self.declared.range_m {
+            return None;
         }
         let (outer, inner) = (
             outer.as_ref().unwrap_or(&self.outer),
             inner.as_ref().unwrap_or(&self.inner),
         );
-        Arc::new(Geometry::new(
-            Walls::new(outer, inner, self.rules.thickness_m),
-            self.kind,
-            machine,
-        ))
+        Some(Walls::new(outer, inner, self.rules.thickness_m))
     }
 
     /// What there is to know of a place on a wall.

@@ -1,5 +1,7 @@
 //! A coarse grid whose cells list the runs of segments within a disc.
 
+use std::sync::Arc;
+
 use track::Vec2;
 
 use super::grid::{Neighbours, Strip};
@@ -11,7 +13,7 @@ use crate::walls::nearest_on_segment;
 /// point of the cell.
 #[derive(Debug, Clone)]
 pub(crate) struct Cells {
-    near: Neighbours,
+    near: Arc<Neighbours>,
 }
 
 impl Cells {
@@ -24,7 +26,7 @@ impl Cells {
         };
         let strips: Vec<Strip> = walls.segments().map(strip).collect();
         Self {
-            near: Neighbours::new(walls.bounds_m(), disc_m, &strips),
+            near: Arc::new(Neighbours::new(walls.bounds_m(), disc_m, &strips)),
         }
     }
 

@@ -4,8 +4,6 @@ use std::ops::Range;
 
 use track::Vec2;
 
-use crate::walls::nearest_on_segment;
-
 /// The geometry of a uniform grid.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Grid {
@@ -50,14 +48,10 @@ impl Grid {
         self.low + Vec2::new(column as f64 + 0.5, row as f64 + 0.5) * self.cell_m
     }
 
-    /// Columns and rows of the cells that meet the box from `low` to `high`.
-    pub(super) fn cover(&self, low: Vec2, high: Vec2) -> (Range<usize>, Range<usize>) {
-        let index = |x: f64, count: usize| ((x * self.per_m).max(0.0) as usize).min(count - 1);
-        let (low, high) = (low - self.low, high - self.low);
-        (
-            index(low.x, self.columns)..index(high.x, self.columns) + 1,
-            index(low.y, self.rows)..index(high.y, self.rows) + 1,
-        )
+    /// Rows of the cells that meet the heights from `low` to `high`.
+    fn rows_between(&self, low: f64, high: f64) -> Range<usize> {
+        let row = |y: f64| (((y - self.low.y) * self.per_m).max(0.0) as usize).min(self.rows - 1);
+        row(low)..row(high) + 1
     }
 }
 
@@ -115,17 +109,65 @@ impl Neighbours {
     }
 }
 
-/// Calls `found` with every cell whose centre is within `within_m` of the strip's line.
+/// Calls `found` with every cell whose centre is within `within_m` of the strip's line: in each row those between the
+/// ends of the row's cut through two discs about the line's ends and the band between them.
 fn near(grid: &Grid, strip: &Strip, within_m: f64, mut found: impl FnMut(u32)) {
     let Strip { from, to, .. } = *strip;
-    let (columns, rows) = grid.cover(from.min(to) - within_m, from.max(to) + within_m);
-    for row in rows {
-        for column in columns.clone() {
-            let center = grid.center(column, row);
-            if nearest_on_segment(from, to, center).distance_squared(center) <= within_m * within_m {
-                found((row * grid.columns + column) as u32);
+    let band = Band::new(from, to, within_m);
+    for row in grid.rows_between(from.y.min(to.y) - within_m, from.y.max(to.y) + within_m) {
+        let y = grid.center(0, row).y;
+        let cuts = [
+            disc_cut(from, within_m, y),
+            disc_cut(to, within_m, y),
+            band.cut(y),
+        ];
+        let [low, high] = cuts
+            .into_iter()
+            .fold(NO_CUT, |[a, b], [low, high]| [a.min(low), b.max(high)]);
+        let column = |x: f64| (x - grid.low.x) * grid.per_m - 0.5;
+        let first = column(low).ceil().max(0.0) as usize;
+        let end = (column(high).floor() + 1.0).clamp(0.0, grid.columns as f64) as usize;
+        for column in first..end {
+            found((row * grid.columns + column) as u32);
+        }
+    }
+}
+
+/// A cut that holds nothing.
+const NO_CUT: [f64; 2] = [f64::INFINITY, f64::NEG_INFINITY];
+
+/// Where the horizontal line at `y` enters and leaves a disc.
+fn disc_cut(center: Vec2, radius_m: f64, y: f64) -> [f64; 2] {
+    let squared = radius_m * radius_m - (y - center.y) * (y - center.y);
+    if squared < 0.0 {
+        return NO_CUT;
+    }
+    [center.x - squared.sqrt(), center.x + squared.sqrt()]
+}
+
+/// The corners of a rectangle about a line.
+#[derive(Debug)]
+struct Band([Vec2; 4]);
+
+impl Band {
+    fn new(from: Vec2, to: Vec2, within_m: f64) -> Self {
+        let aside = (to - from).try_normalize().unwrap_or(Vec2::ZERO).perp() * within_m;
+        Self([from + aside, to + aside, to - aside, from - aside])
+    }
+
+    /// Where the horizontal line at `y` enters and leaves it.
+    fn cut(&self, y: f64) -> [f64; 2] {
+        let mut cut = NO_CUT;
+        for i in 0..4 {
+            let (a, b) = (self.0[i], self.0[(i + 1) % 4]);
+            let (rise, up) = (b.y - a.y, y - a.y);
+            // An edge along the line ends where its neighbours cross it.
+            if (up >= 0.0) != (y - b.y >= 0.0) {
+                let x = a.x + (b.x - a.x) * (up / rise);
+                cut = [cut[0].min(x), cut[1].max(x)];
             }
         }
+        cut
     }
 }
 

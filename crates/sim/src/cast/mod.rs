@@ -191,6 +191,21 @@ enum Method {
 }
 
 impl Caster {
+    /// The caster for walls whose vertices moved by no more than what the caster's `spread_m` has to spare; `None` where
+    /// it must be made anew.
+    pub(crate) fn over(&self, walls: &Walls) -> Option<Self> {
+        let method = match &self.method {
+            Method::Brute => Method::Brute,
+            Method::Bvh(_) => Method::Bvh(Box::new(bvh::Bvh::new(walls))),
+            Method::Cells(cells) => Method::Cells(cells.clone()),
+            Method::Tree(tree) => Method::Tree(tree.over(walls)?),
+        };
+        Some(Self {
+            method,
+            range_m: self.range_m,
+        })
+    }
+
     /// Prepares the walls for rays of at most `range_m` that start within `spread_m` of the robot's centre; `None`
     /// chooses the kind by the walls.
     pub fn new(kind: Option<CasterKind>, walls: &Walls, range_m: f64, spread_m: f64) -> Self {

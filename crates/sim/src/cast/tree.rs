@@ -1,5 +1,7 @@
 //! A coarse grid whose cells list stretches of wall, and below each stretch a tree of eights.
 
+use std::sync::Arc;
+
 use track::Vec2;
 use wide::f64x8;
 
@@ -15,7 +17,7 @@ use crate::walls::nearest_on_segment;
 /// against eight smaller stretches at once and at last against eight segments.
 #[derive(Debug, Clone)]
 pub(super) struct Tree {
-    near: Neighbours,
+    near: Arc<Neighbours>,
     stretches: Stretches,
 }
 
@@ -77,9 +79,18 @@ impl Tree {
         let stretches = Stretches::new(walls);
         let strips: Vec<Strip> = stretches.strips().collect();
         Self {
-            near: Neighbours::new(walls.bounds_m(), disc_m, &strips),
+            near: Arc::new(Neighbours::new(walls.bounds_m(), disc_m, &strips)),
             stretches,
         }
+    }
+
+    /// The tree with the same lists over walls whose vertices moved a little; `None` where other stretches suit them.
+    pub(super) fn over(&self, walls: &Walls) -> Option<Self> {
+        let stretches = Stretches::new(walls);
+        (stretches.top == self.stretches.top).then(|| Self {
+            near: Arc::clone(&self.near),
+            stretches,
+        })
     }
 
     /// Eight rays at once against the stretches near the robot's centre.

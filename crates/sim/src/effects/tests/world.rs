@@ -1,9 +1,11 @@
+use std::sync::Arc;
+
 use proptest::prelude::*;
 use track::{Side, Vec2};
 
 use super::super::testing::{active, declared, scene, silent, with};
 use super::super::{Active, Pattern, Setting, Site, find};
-use crate::{WallPlace, Walls, segment_distance_m};
+use crate::{CasterKind, Forecast, Pose, Run, Scene, Step, Streams, WallPlace, Walls, segment_distance_m};
 
 /// The walls as one effect moves them.
 fn moved(name: &str, values: &[f64]) -> Walls {
@@ -144,17 +146,20 @@ fn vertices_move_in_proportion() {
     }
 }
 
+/// The outer wall moving from 1 mm on, outwards where positive.
+fn moving_wall(m_per_s: f64) -> Setting {
+    Setting {
+        spec: find("outer-wall-offset").unwrap(),
+        pattern: Pattern::ByTime {
+            start: vec![0.001],
+            per_s: vec![m_per_s],
+        },
+    }
+}
+
 #[test]
 fn walls_move_with_time() {
-    let pattern = Pattern::ByTime {
-        start: vec![0.001],
-        per_s: vec![1e-5],
-    };
-    let setting = Setting {
-        spec: find("outer-wall-offset").unwrap(),
-        pattern,
-    };
-    let mut effects = Active::all(&[setting], 0).unwrap();
+    let mut effects = Active::all(&[moving_wall(1e-5)], 0).unwrap();
     effects.iter_mut().for_each(|active| active.advance(300.0));
     let walls = scene().geometry(&effects, &declared().machine).walls.clone();
     for ((i, a, _), (_, b, _)) in walls.segments().zip(scene().walls().segments()) {
@@ -165,6 +170,51 @@ fn walls_move_with_time() {
         };
         assert!(((a - b).length() - expected_m).abs() < 1e-12, "vertex {i}");
     }
+}
+
+/// The lists of what is near are kept for walls that move a little and made anew for those that move more: every ray
+/// must meet what it meets without lists.
+#[test]
+fn casters_agree_while_walls_move() {
+    let circuit = Arc::new(scene().circuit().clone());
+    for (max_error_m, m_per_s) in [(0.005, 2e-4), (0.005, -3e-3), (2e-5, -3e-3)] {
+        let mut model = declared();
+        model.wall.max_error_m = max_error_m;
+        model.effects.push(moving_wall(m_per_s));
+        let drive = |kind| {
+            let scene = Scene::new(Arc::clone(&circuit), &model, Some(kind)).unwrap();
+            let world = scene.world(&model, 0).unwrap();
+            let mut run = Run::new(&world, Streams { seed: 3, run: 0 }).unwrap();
+            (0..400).map(|_| run.step()).collect::<Vec<Step>>()
+        };
+        let plain = drive(CasterKind::Brute);
+        for kind in [CasterKind::Cells, CasterKind::Tree] {
+            assert!(drive(kind) == plain, "{kind:?} at {m_per_s} m/s");
+        }
+    }
+}
+
+/// A wall that moves beside a world is seen where it is at the time, not twice as far.
+#[test]
+fn a_wall_that_moves_beside_a_world_moves_once() {
+    let model = silent();
+    let world = scene().world(&model, 0).unwrap();
+    let still = Setting::constant(find("outer-wall-offset").unwrap(), [0.003]);
+    let mut plain = Forecast::new(&world).unwrap();
+    let forecasts = [moving_wall(1e-5), still].map(|setting| Forecast::beside(&world, &[setting]));
+    let [mut moving, mut still] = forecasts.map(Result::unwrap);
+    let gate = scene().circuit().gates[10];
+    let forward = gate.forward();
+    let pose = Pose::new(gate.center.x, gate.center.y, forward.y.atan2(forward.x));
+    let exact = [[0.0; 3]; 3];
+    plain.tick(200.0);
+    let look = plain.readings(pose, &exact).look;
+    let expected = still.readings_beside(pose, &exact, &look);
+    moving.tick(200.0);
+    for (reading, expected) in moving.readings_beside(pose, &exact, &look).iter().zip(expected) {
+        assert!((reading - expected).abs() < 1e-9, "{reading} for {expected}");
+    }
+    assert!(expected != plain.readings(pose, &exact).mean);
 }
 
 proptest! {

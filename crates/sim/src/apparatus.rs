@@ -1,0 +1,119 @@
+//! What one run drives with as its effects make it: the machine, its rays, its walls.
+
+use std::sync::Arc;
+
+use track::Vec2;
+
+use crate::cast::Rays;
+use crate::effects::{Active, Stage};
+use crate::world::{Geometry, World, altered};
+use crate::{Error, Machine, Setting};
+
+/// The rays that one ray of the beam makes on all eight sensors, in the body frame.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Sight {
+    pub(crate) rays: Rays,
+    pub(crate) weight: f64,
+}
+
+/// A run's machine, rays, walls and effects at one time.
+#[derive(Debug)]
+pub(crate) struct Apparatus<'w> {
+    pub(crate) world: &'w World<'w>,
+    pub(crate) effects: Vec<Active>,
+    pub(crate) machine: Machine,
+    pub(crate) sights: Vec<Sight>,
+    pub(crate) geometry: Arc<Geometry>,
+    /// Whether an effect must be asked for every ray.
+    pub(crate) weighs_rays: bool,
+    /// Effects whose displacement of the walls is not in the geometry.
+    pub(crate) displacing: Vec<Active>,
+    /// Those whose displacement is.
+    cutting: Vec<Active>,
+    drifting: bool,
+    steps: u64,
+}
+
+impl<'w> Apparatus<'w> {
+    /// A world's at the start of its run, with further effects, which leave its walls where they are.
+    pub(crate) fn new(world: &'w World<'w>, further: &[Setting]) -> Result<Self, Error> {
+        let own = &world.model.effects;
+        let settings: Vec<Setting> = own.iter().chain(further).cloned().collect();
+        let effects = Active::all(&settings, world.run)?;
+        let machine = altered(&world.model.machine, &effects);
+        Ok(Self {
+            world,
+            geometry: Arc::clone(&world.geometry),
+            sights: sights(&machine),
+            weighs_rays: effects.iter().any(|active| active.effect.weighs_rays()),
+            displacing: on_walls(further, world.run)?,
+            cutting: on_walls(own, world.run)?,
+            drifting: effects.iter().any(Active::drifts),
+            machine,
+            effects,
+            steps: 0,
+        })
+    }
+
+    /// Whether anything changes in time.
+    pub(crate) fn drifts(&self) -> bool {
+        self.drifting
+    }
+
+    /// Goes to the next control step, which begins at `time_s` since the run began.
+    #[inline]
+    pub(crate) fn advance(&mut self, time_s: f64) {
+        if self.drifting {
+            self.drift(time_s);
+        }
+    }
+
+    fn drift(&mut self, time_s: f64) {
+        for active in (self.effects.iter_mut()).chain(&mut self.displacing) {
+            active.advance(time_s);
+        }
+        let machine = altered(&self.world.model.machine, &self.effects);
+        if machine.beam != self.machine.beam || machine.mounts != self.machine.mounts {
+            self.sights = sights(&machine);
+        }
+        self.machine = machine;
+        // Walls are cut anew only a few times in a lap: they move by micrometres in that time.
+        const STEPS_BETWEEN_CUTS: u64 = 64;
+        if self.steps.is_multiple_of(STEPS_BETWEEN_CUTS) {
+            self.cut(time_s);
+        }
+        self.steps += 1;
+    }
+
+    /// Brings the walls up to date, where they move or rays go farther than they were prepared for.
+    fn cut(&mut self, time_s: f64) {
+        let moves = self.cutting.iter().any(Active::drifts);
+        if moves || self.machine.range_m > self.geometry.range_m {
+            self.cutting.iter_mut().for_each(|active| active.advance(time_s));
+            let scene = self.world.scene;
+            self.geometry = scene.geometry_from(&self.geometry, &self.cutting, &self.machine);
+        }
+    }
+}
+
+/// The effects of one run that may move walls.
+fn on_walls(settings: &[Setting], run: usize) -> Result<Vec<Active>, Error> {
+    let walls = settings
+        .iter()
+        .filter(|setting| setting.spec.stage == Stage::World);
+    Active::all(&walls.cloned().collect::<Vec<_>>(), run)
+}
+
+/// The beam of all sensors, ray by ray.
+fn sights(machine: &Machine) -> Vec<Sight> {
+    let axes = machine
+        .mounts
+        .map(|mount| Vec2::new(mount.angle_rad.cos(), mount.angle_rad.sin()));
+    let sight = |&(turn, weight): &(Vec2, f64)| Sight {
+        rays: Rays::new(std::array::from_fn(|i| {
+            (machine.mounts[i].position, axes[i].rotate(turn))
+        })),
+        weight,
+    };
+    machine.beam.rays().iter().map(sight).collect()
+}
