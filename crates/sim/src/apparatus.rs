@@ -30,7 +30,9 @@ pub(crate) struct Apparatus<'w> {
     pub(crate) displacing: Vec<Active>,
     /// Those whose displacement is.
     cutting: Vec<Active>,
+    /// Whether any value changes in time, and whether one that the machine is made of does.
     drifting: bool,
+    remade: bool,
     steps: u64,
 }
 
@@ -49,15 +51,16 @@ impl<'w> Apparatus<'w> {
             displacing: on_walls(further, world.run)?,
             cutting: on_walls(own, world.run)?,
             drifting: effects.iter().any(Active::drifts),
+            remade: (effects.iter()).any(|active| active.drifts() && active.effect.on_machine().is_some()),
             machine,
             effects,
             steps: 0,
         })
     }
 
-    /// Whether anything changes in time.
-    pub(crate) fn drifts(&self) -> bool {
-        self.drifting
+    /// Whether walls or sensors may move in time.
+    pub(crate) fn moves(&self) -> bool {
+        self.remade || self.cutting.iter().any(Active::drifts)
     }
 
     /// Goes to the next control step, which begins at `time_s` since the run began.
@@ -72,11 +75,13 @@ impl<'w> Apparatus<'w> {
         for active in (self.effects.iter_mut()).chain(&mut self.displacing) {
             active.advance(time_s);
         }
-        let machine = altered(&self.world.model.machine, &self.effects);
-        if machine.beam != self.machine.beam || machine.mounts != self.machine.mounts {
-            self.sights = sights(&machine);
+        if self.remade {
+            let machine = altered(&self.world.model.machine, &self.effects);
+            if machine.beam != self.machine.beam || machine.mounts != self.machine.mounts {
+                self.sights = sights(&machine);
+            }
+            self.machine = machine;
         }
-        self.machine = machine;
         // Walls are cut anew only a few times in a lap: they move by micrometres in that time.
         const STEPS_BETWEEN_CUTS: u64 = 64;
         if self.steps.is_multiple_of(STEPS_BETWEEN_CUTS) {
@@ -87,8 +92,7 @@ impl<'w> Apparatus<'w> {
 
     /// Brings the walls up to date, where they move or rays go farther than they were prepared for.
     fn cut(&mut self, time_s: f64) {
-        let moves = self.cutting.iter().any(Active::drifts);
-        if moves || self.machine.range_m > self.geometry.range_m {
+        if self.cutting.iter().any(Active::drifts) || self.machine.range_m > self.geometry.range_m {
             self.cutting.iter_mut().for_each(|active| active.advance(time_s));
             let scene = self.world.scene;
             self.geometry = scene.geometry_from(&self.geometry, &self.cutting, &self.machine);

@@ -95,7 +95,7 @@ impl<'w> Forecast<'w> {
         let weighs = |active: &Active| active.effect.weighs_rays();
         let others = Active::all(&other.model.effects, other.run)?;
         let (mine, theirs) = (&self.apparatus.machine, &other.machine);
-        self.recasts = self.apparatus.drifts()
+        self.recasts = self.apparatus.moves()
             || !Arc::ptr_eq(&self.apparatus.geometry, &other.geometry)
             || mine.mounts != theirs.mounts
             || mine.beam != theirs.beam

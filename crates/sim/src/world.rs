@@ -293,7 +293,9 @@ const PARTS: u32 = 8;
 pub(crate) fn altered(machine: &Machine, effects: &[Active]) -> Machine {
     let mut machine = machine.clone();
     for active in effects {
-        active.effect.machine(&active.values, &mut machine);
+        if let Some(change) = active.effect.on_machine() {
+            change(&active.values, &mut machine);
+        }
     }
     machine
 }

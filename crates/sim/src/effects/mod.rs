@@ -259,8 +259,10 @@ pub struct Hit {
 /// Hooks into the tick. Each gets the values of the effect's parameters in the order of its [`Spec`]; each does
 /// nothing unless an effect says otherwise.
 pub trait Effect: Debug + Send {
-    /// Changes constants of the machine.
-    fn machine(&self, _values: &[f64], _machine: &mut Machine) {}
+    /// What changes constants of the machine, if anything does.
+    fn on_machine(&self) -> Option<fn(&[f64], &mut Machine)> {
+        None
+    }
     /// How far the wall is moved here, m, positive to the left of the driving direction.
     fn displacement_m(&self, _values: &[f64], _at: &Site) -> f64 {
         0.0

@@ -10,8 +10,8 @@ use crate::{Machine, Readings, Twist, WheelSpeeds};
 pub(super) struct OnMachine(pub(super) fn(&[f64], &mut Machine));
 
 impl Effect for OnMachine {
-    fn machine(&self, values: &[f64], machine: &mut Machine) {
-        (self.0)(values, machine);
+    fn on_machine(&self) -> Option<fn(&[f64], &mut Machine)> {
+        Some(self.0)
     }
 }
 

@@ -128,7 +128,7 @@ fn scale_and_sag_by_hand() {
 fn a_longer_axle_turns_slower() {
     let mut machine = declared().machine;
     let axle = active("axle-length", &[1.25]);
-    axle.effect.machine(&axle.values, &mut machine);
+    axle.effect.on_machine().unwrap()(&axle.values, &mut machine);
     let wheels = WheelSpeeds {
         left_m_s: 0.03,
         right_m_s: 0.05,

@@ -7,7 +7,7 @@ use crate::{Machine, Model, Pose, Readings, WallPlace, segment_distance_m};
 
 fn altered(name: &str, values: &[f64]) -> Machine {
     let (active, mut machine) = (active(name, values), declared().machine);
-    active.effect.machine(&active.values, &mut machine);
+    active.effect.on_machine().unwrap()(&active.values, &mut machine);
     machine
 }
 

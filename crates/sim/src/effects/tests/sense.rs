@@ -92,7 +92,7 @@ fn noise_scales_with_its_factor() {
     let plain = declared().machine;
     let mut louder = plain.clone();
     let noise = active("reading-noise", &[3.0]);
-    noise.effect.machine(&noise.values, &mut louder);
+    noise.effect.on_machine().unwrap()(&noise.values, &mut louder);
     for reading in [0.0, 10.0, 3000.0] {
         let ratio = louder.noise.deviation(reading) / plain.noise.deviation(reading);
         assert!((ratio - 3.0).abs() < 1e-12);
