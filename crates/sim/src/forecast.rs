@@ -31,12 +31,23 @@ pub struct Motion {
 pub struct Forecast<'w> {
     world: &'w World<'w>,
     apparatus: Apparatus<'w>,
-    /// Whether rays go otherwise than in the world without the further effects, and whether they answer otherwise.
-    recasts: bool,
-    responds: bool,
+    beside: Beside,
     /// What comes through of a small change of the readings; `None` for all of it.
     through: Option<[[f64; LANES]; LANES]>,
     now: Moment,
+}
+
+/// In what readings differ from those of the same world without the further effects, besides what effects on readings do.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Beside {
+    /// In nothing.
+    Nothing,
+    /// Walls, or what they send back, differ at places.
+    Places,
+    /// Sensors respond otherwise.
+    Responses,
+    /// Rays go otherwise.
+    Rays,
 }
 
 impl<'w> Forecast<'w> {
@@ -63,8 +74,7 @@ impl<'w> Forecast<'w> {
         let mut forecast = Self {
             world,
             apparatus: Apparatus::new(world, further)?,
-            recasts: false,
-            responds: false,
+            beside: Beside::Nothing,
             through: None,
             now: Moment {
                 time_s: 0.0,
@@ -95,16 +105,21 @@ impl<'w> Forecast<'w> {
         let weighs = |active: &Active| active.effect.weighs_rays();
         let others = Active::all(&other.model.effects, other.run)?;
         let (mine, theirs) = (&self.apparatus.machine, &other.machine);
-        self.recasts = self.apparatus.moves()
+        let rays = self.apparatus.moves()
             || !Arc::ptr_eq(&self.apparatus.geometry, &other.geometry)
             || mine.mounts != theirs.mounts
-            || mine.beam != theirs.beam
-            || mine.beam.rays().len() > 1;
-        self.responds = self.apparatus.weighs_rays
-            || others.iter().any(weighs)
-            || !self.apparatus.displacing.is_empty()
-            || mine.range_m != theirs.range_m
-            || mine.response != theirs.response;
+            || mine.beam != theirs.beam;
+        let responses = mine.range_m != theirs.range_m || mine.response != theirs.response;
+        let places =
+            self.apparatus.weighs_rays || others.iter().any(weighs) || !self.apparatus.displacing.is_empty();
+        // A look knows one ray of a sensor.
+        let several = mine.beam.rays().len() > 1 && (responses || places);
+        self.beside = match () {
+            () if rays || several => Beside::Rays,
+            () if responses => Beside::Responses,
+            () if places => Beside::Places,
+            () => Beside::Nothing,
+        };
         Ok(())
     }
 
@@ -145,12 +160,11 @@ impl<'w> Forecast<'w> {
     /// Expected readings where the same world without further effects had this look: rays are cast again only where
     /// the further effects turn them.
     pub fn readings_beside(&mut self, pose: Pose, covariance: &PoseMatrix, look: &Look) -> Readings {
-        let mut readings = if self.recasts {
-            self.apparatus.outlook(pose, covariance).mean
-        } else if self.responds {
-            self.apparatus.responses_again(look)
-        } else {
-            look.response()
+        let mut readings = match self.beside {
+            Beside::Nothing => look.response(),
+            Beside::Places => self.apparatus.responses_where_met(look),
+            Beside::Responses => self.apparatus.responses_again(look),
+            Beside::Rays => self.apparatus.outlook(pose, covariance).mean,
         };
         self.change_readings(pose, &mut readings);
         readings

@@ -28,6 +28,8 @@ pub struct Look {
     pub deviation_m: [f64; LANES],
     rays: Rays,
     hits: Hits,
+    /// What effects made of the rays' responses.
+    factor: [f64; LANES],
     /// Responses before effects on readings, counts.
     response: Readings,
 }
@@ -40,6 +42,21 @@ struct Glance {
     slope: [f64; 3],
     deviation_m: f64,
     factor: f64,
+    bend: Bend,
+}
+
+/// Distances along eight rays, m, and what effects make of their responses.
+struct Met {
+    distance_m: [f64; LANES],
+    factor: [f64; LANES],
+}
+
+/// A response at a distance, its derivative (counts/m) and its second derivative (counts/m^2).
+#[derive(Clone, Copy)]
+struct Bend {
+    value: f64,
+    rise: f64,
+    curve: f64,
 }
 
 impl Apparatus<'_> {
@@ -54,6 +71,7 @@ impl Apparatus<'_> {
                 deviation_m: [0.0; LANES],
                 rays: self.sights[0].rays.placed(pose),
                 hits: Hits::NONE,
+                factor: [1.0; LANES],
                 response: [0.0; LANES],
             },
         };
@@ -64,28 +82,26 @@ impl Apparatus<'_> {
                 .geometry
                 .caster
                 .cast(&self.geometry.walls, pose.position, &rays);
+            let met = self.met(&rays, &hits);
             if number == middle {
-                (outlook.look.rays, outlook.look.hits, outlook.look.distance_m) =
-                    (rays, hits, hits.distance_m);
+                (outlook.look.rays, outlook.look.hits) = (rays, hits);
+                (outlook.look.distance_m, outlook.look.factor) = (hits.distance_m, met.factor);
             }
+            let bends = bends(&self.machine.response, &met.distance_m);
             for lane in (0..LANES).filter(|&lane| hits.distance_m[lane].is_finite()) {
                 let slope = self.distance_slope(pose, &rays, &hits, lane);
                 let deviation_m = quadratic(covariance, slope).max(0.0).sqrt();
                 if number == middle {
                     outlook.look.deviation_m[lane] = deviation_m;
                 }
-                let (distance_m, factor) = self.met(&rays, &hits, lane);
-                self.add_ray(
-                    &mut outlook,
-                    lane,
-                    sight.weight,
-                    Glance {
-                        distance_m,
-                        slope,
-                        deviation_m,
-                        factor,
-                    },
-                );
+                let glance = Glance {
+                    distance_m: met.distance_m[lane],
+                    slope,
+                    deviation_m,
+                    factor: met.factor[lane],
+                    bend: bends[lane],
+                };
+                self.add_ray(&mut outlook, lane, sight.weight, glance);
             }
         }
         if self.machine.beam.combine == Combine::Distances {
@@ -95,26 +111,53 @@ impl Apparatus<'_> {
         outlook
     }
 
+    /// The same responses from a look that one ray a sensor had before in a world whose sensors respond alike.
+    pub(crate) fn responses_where_met(&self, look: &Look) -> Readings {
+        let met = self.met(&look.rays, &look.hits);
+        if met.distance_m == look.hits.distance_m && met.factor == look.factor {
+            return look.response;
+        }
+        self.responses_to(&met, look)
+    }
+
     /// The same responses from a look that one ray a sensor had before.
     pub(crate) fn responses_again(&self, look: &Look) -> Readings {
+        self.responses_to(&self.met(&look.rays, &look.hits), look)
+    }
+
+    fn responses_to(&self, met: &Met, look: &Look) -> Readings {
+        let bends = bends(&self.machine.response, &met.distance_m);
         std::array::from_fn(|lane| {
             if !look.hits.distance_m[lane].is_finite() {
                 return 0.0;
             }
-            let (distance_m, factor) = self.met(&look.rays, &look.hits, lane);
-            let (deviation_m, range_m) = (look.deviation_m[lane], self.machine.range_m);
-            let (value, _, bend) = bend(&self.machine.response, distance_m);
-            factor * curved(value, bend, deviation_m) * seen_within(range_m - distance_m, deviation_m).0
+            let (deviation_m, short_m) = (
+                look.deviation_m[lane],
+                self.machine.range_m - met.distance_m[lane],
+            );
+            let Bend { value, curve, .. } = bends[lane];
+            met.factor[lane] * curved(value, curve, deviation_m) * seen_within(short_m, deviation_m).0
         })
     }
 
-    /// Distance along one ray after what displaces the walls to first order, and what effects make of its response.
+    /// What the rays met after what displaces the walls to first order.
     #[inline]
-    fn met(&self, rays: &Rays, hits: &Hits, lane: usize) -> (f64, f64) {
-        let distance_m = hits.distance_m[lane];
-        if !self.weighs_rays && self.displacing.is_empty() {
-            return (distance_m, 1.0);
+    fn met(&self, rays: &Rays, hits: &Hits) -> Met {
+        let mut met = Met {
+            distance_m: hits.distance_m,
+            factor: [1.0; LANES],
+        };
+        if self.weighs_rays || !self.displacing.is_empty() {
+            for lane in (0..LANES).filter(|&lane| hits.distance_m[lane].is_finite()) {
+                (met.distance_m[lane], met.factor[lane]) = self.met_by(rays, hits, lane);
+            }
         }
+        met
+    }
+
+    /// Distance along one ray and what effects make of its response.
+    fn met_by(&self, rays: &Rays, hits: &Hits, lane: usize) -> (f64, f64) {
+        let distance_m = hits.distance_m[lane];
         let (walls, segment) = (&self.geometry.walls, hits.segment[lane] as usize);
         let direction = rays.direction(lane);
         let towards = walls.normal(segment).dot(direction);
@@ -146,6 +189,7 @@ impl Apparatus<'_> {
             slope,
             deviation_m,
             factor,
+            bend,
         } = glance;
         let short_m = self.machine.range_m - distance_m;
         if short_m < -4.0 * deviation_m {
@@ -156,11 +200,11 @@ impl Apparatus<'_> {
             (0..3).for_each(|axis| outlook.slope[lane][axis] -= weight * slope[axis]);
             return;
         }
-        let (value, rise, bend) = bend(&self.machine.response, distance_m);
+        let Bend { value, rise, curve } = bend;
         let (seen, edge) = seen_within(short_m, deviation_m);
         let spread = seen * (1.0 - seen) - (edge * deviation_m).powi(2);
         outlook.edge_variance[lane] += (weight * factor * value).powi(2) * spread.max(0.0);
-        outlook.mean[lane] += weight * factor * seen * curved(value, bend, deviation_m);
+        outlook.mean[lane] += weight * factor * seen * curved(value, curve, deviation_m);
         for axis in 0..3 {
             outlook.slope[lane][axis] += weight * factor * (seen * rise - edge * value) * slope[axis];
         }
@@ -170,7 +214,7 @@ impl Apparatus<'_> {
     fn respond_to_mean_distance(&self, outlook: &mut Outlook) {
         for lane in 0..LANES {
             let short_m = outlook.mean[lane];
-            let (value, rise, _) = bend(&self.machine.response, self.machine.range_m - short_m);
+            let Bend { value, rise, .. } = bend(&self.machine.response, self.machine.range_m - short_m);
             let seen = if short_m > 1e-12 { 1.0 } else { 0.0 };
             outlook.mean[lane] = seen * value;
             outlook.slope[lane] = outlook.slope[lane].map(|slope| -seen * rise * slope);
@@ -202,6 +246,7 @@ impl Default for Look {
             deviation_m: [0.0; LANES],
             rays,
             hits: Hits::NONE,
+            factor: [1.0; LANES],
             response: [0.0; LANES],
         }
     }
@@ -251,25 +296,41 @@ fn quadratic(m: &PoseMatrix, s: [f64; 3]) -> f64 {
         .sum()
 }
 
-/// A response at a distance with its first and second derivative.
+/// A response at eight distances, computed together; meaningless where a distance is infinite.
 #[inline]
-fn bend(response: &Response, distance_m: f64) -> (f64, f64, f64) {
+fn bends(response: &Response, distance_m: &[f64; LANES]) -> [Bend; LANES] {
+    let values = response.readings(distance_m);
+    std::array::from_fn(|lane| bend_at(response, distance_m[lane], values[lane]))
+}
+
+#[inline]
+fn bend(response: &Response, distance_m: f64) -> Bend {
+    bend_at(response, distance_m, response.reading(distance_m))
+}
+
+/// A response at a distance where it has this value.
+#[inline(always)]
+fn bend_at(response: &Response, distance_m: f64, value: f64) -> Bend {
     match *response {
         Response::Improved {
-            a_counts,
-            d0_m,
-            exponent,
+            a_counts, exponent, ..
         } if distance_m > 0.0 => {
-            let power = (exponent * (distance_m / d0_m).ln()).exp();
-            let (value, share) = (a_counts / (1.0 + power), power / (1.0 + power));
+            let share = 1.0 - value / a_counts;
             let rate = exponent / distance_m;
-            let bend = rate / distance_m * value * share * (1.0 + exponent * (2.0 * share - 1.0));
-            (value, -rate * value * share, bend)
+            Bend {
+                value,
+                rise: -rate * value * share,
+                curve: rate / distance_m * value * share * (1.0 + exponent * (2.0 * share - 1.0)),
+            }
         }
         _ => {
             const H_M: f64 = 1e-4;
-            let [low, middle, high] = [-H_M, 0.0, H_M].map(|h| response.reading((distance_m + h).max(0.0)));
-            (middle, (high - low) / (2.0 * H_M), 0.0)
+            let [low, high] = [-H_M, H_M].map(|h| response.reading((distance_m + h).max(0.0)));
+            Bend {
+                value,
+                rise: (high - low) / (2.0 * H_M),
+                curve: 0.0,
+            }
         }
     }
 }

@@ -10,7 +10,7 @@ use super::catalogue::{Variant, unlisted_variants, variants};
 use super::decide::{Decided, decided};
 use super::evidence::Evidence;
 use super::filter::{MEASURED, Trace};
-use super::noise::noises;
+use super::noise::{Factor, noises};
 use super::pairs::pairs;
 use super::recut::recut;
 use super::refine::jumps;
@@ -279,11 +279,17 @@ impl<'a> Search<'a> {
     }
 
     /// A noise effect is a candidate only where nothing with a mean is left once it is fitted.
-    fn accept_noise(&mut self, noise: Vec<Refined>) {
+    fn accept_noise(&mut self, noise: Vec<Factor>) {
         /// Log-likelihood that a column may still gain then.
         const LEFT: f64 = 14.0;
+        /// Share of the best score by which a gain known to a tenth may fall short of it.
+        const NEAR: f64 = 0.8;
         let best = self.found.first().map_or(0.0, Refined::score);
-        let Some(one) = noise.into_iter().max_by(|a, b| a.gain.total_cmp(&b.gain)) else {
+        let largest = noise.into_iter().max_by(|a, b| a.gain.total_cmp(&b.gain));
+        let Some(one) = largest
+            .filter(|one| one.gain > NEAR * best)
+            .and_then(|one| one.refined(&self.evidence, &[], self.total()))
+        else {
             return;
         };
         if one.score() > best.max(4.0) {
@@ -315,7 +321,8 @@ impl<'a> Search<'a> {
             let noise = noise
                 .into_iter()
                 .filter(|n| n.gain > 10.0)
-                .max_by(|a, b| a.gain.total_cmp(&b.gain));
+                .max_by(|a, b| a.gain.total_cmp(&b.gain))
+                .and_then(|n| n.refined(&self.evidence, &best.settings, self.total() + best.gain));
             more.extend(noise.map(|n| n.after(&best)));
         }
         if best.by == By::Constant {
@@ -611,7 +618,7 @@ fn most(leads: &[Lead]) -> f64 {
 }
 
 /// Probability that one of the noise effects gains as much by chance.
-fn by_chance(noise: &[Refined]) -> f64 {
+fn by_chance(noise: &[Factor]) -> f64 {
     noise
         .iter()
         .map(|n| tail(2.0 * n.gain, 1) * 6.0)

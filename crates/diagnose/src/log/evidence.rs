@@ -5,7 +5,7 @@ use sim::{Forecast, Model, Pattern, Scene, Setting, World};
 
 use super::catalogue::stage_of;
 use super::columns::columns;
-use super::filter::{Trace, Used, clear_readings, filter};
+use super::filter::{Trace, Used, clear_readings, filter, likelihood};
 use super::rows::{LogRow, stretches};
 use super::screen::{Normal, normal_of};
 
@@ -153,7 +153,12 @@ impl<'a> Evidence<'a> {
 
     /// The log-likelihood with these effects added.
     pub(crate) fn likelihood(&self, settings: &[Setting]) -> Option<f64> {
-        self.assess(settings, &[]).map(|found| found.total())
+        let of_stretch = |stretch: &Stretch<'_>| {
+            let world = self.world(settings, stretch.run).ok()?;
+            likelihood(&world, stretch.rows, Some(&stretch.used), self.step_counts)
+        };
+        let parts: Option<Vec<f64>> = self.stretches.par_iter().map(of_stretch).collect();
+        Some(parts?.iter().sum())
     }
 
     pub(crate) fn world(&self, settings: &[Setting], run: usize) -> Result<World<'a>, sim::Error> {

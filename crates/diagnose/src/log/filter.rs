@@ -47,7 +47,6 @@ pub(crate) struct Trace {
     pub(crate) instants: Vec<Instant>,
     /// Sum over the used numbers of -(innovation^2 + log variance) / 2.
     pub(crate) log_likelihood: f64,
-    pub(crate) count: usize,
     /// Step that the readings are rounded to, counts; 0 for none.
     pub(crate) step_counts: f64,
 }
@@ -57,12 +56,24 @@ pub(crate) struct Trace {
 struct State {
     pose: Pose,
     covariance: PoseMatrix,
+    /// What the numbers measured since the pose was last settled move it by: x and y, m, and heading, rad.
+    moved: [f64; 3],
 }
 
 impl State {
-    /// One measured number: its whitened innovation, scale and gain.
+    fn new(pose: Pose, covariance: PoseMatrix) -> Self {
+        Self {
+            pose,
+            covariance,
+            moved: [0.0; 3],
+        }
+    }
+
+    /// One measured number, that differs from what was expected at the pose by `missed`: its whitened innovation, scale
+    /// and gain.
     #[inline]
-    fn update(&mut self, innovation: f64, slope: [f64; 3], noise_variance: f64) -> (f64, f64, [f64; 3]) {
+    fn update(&mut self, missed: f64, slope: [f64; 3], noise_variance: f64) -> (f64, f64, [f64; 3]) {
+        let innovation = missed - (0..3).map(|axis| slope[axis] * self.moved[axis]).sum::<f64>();
         let p = &mut self.covariance;
         let across: [f64; 3] =
             std::array::from_fn(|i| p[i][0] * slope[0] + p[i][1] * slope[1] + p[i][2] * slope[2]);
@@ -73,8 +84,14 @@ impl State {
                 p[i][j] -= gain[i] * across[j];
             }
         }
-        self.shift(gain.map(|g| g * innovation));
+        (0..3).for_each(|axis| self.moved[axis] += gain[axis] * innovation);
         (innovation / variance.sqrt(), 1.0 / variance.sqrt(), gain)
+    }
+
+    /// Moves the pose by what was measured.
+    fn settle(&mut self) {
+        self.shift(self.moved);
+        self.moved = [0.0; 3];
     }
 
     fn shift(&mut self, by: [f64; 3]) {
@@ -117,19 +134,39 @@ pub(crate) fn filter(
     used: Option<&[Used]>,
     step_counts: f64,
 ) -> Option<Trace> {
+    let mut instants = Vec::with_capacity(rows.len());
+    let log_likelihood = filtered(world, rows, used, step_counts, |instant| instants.push(instant))?;
+    Some(Trace {
+        instants,
+        log_likelihood,
+        step_counts,
+    })
+}
+
+/// The log-likelihood of a stretch as [`filter`] finds it.
+pub(crate) fn likelihood(
+    world: &World<'_>,
+    rows: &[LogRow],
+    used: Option<&[Used]>,
+    step_counts: f64,
+) -> Option<f64> {
+    filtered(world, rows, used, step_counts, |_| ())
+}
+
+/// Filters one stretch and gives each control step to `each`; the log-likelihood.
+fn filtered(
+    world: &World<'_>,
+    rows: &[LogRow],
+    used: Option<&[Used]>,
+    step_counts: f64,
+    mut each: impl FnMut(Instant),
+) -> Option<f64> {
     let mut forecast = Forecast::new(world).ok()?;
     let start = start_pose(rows, &forecast.machine().robot, world.rules())?;
     let mut covariance = [[0.0; 3]; 3];
     (covariance[0][0], covariance[1][1], covariance[2][2]) = (4e-6, 4e-6, 2.5e-3);
-    let mut state = State {
-        pose: start,
-        covariance,
-    };
-    let mut trace = Trace {
-        instants: Vec::with_capacity(rows.len()),
-        step_counts,
-        ..Trace::default()
-    };
+    let mut state = State::new(start, covariance);
+    let mut log_likelihood = 0.0;
     for (i, row) in rows.iter().enumerate() {
         forecast.tick(row.time_s);
         let usable = match used {
@@ -143,17 +180,18 @@ pub(crate) fn filter(
             usable,
             i >= BURN_IN,
         );
+        let (mut squares, mut density) = (0.0, 1.0);
         for m in (0..MEASURED).filter(|m| instant.used >> m & 1 == 1) {
-            let e = instant.innovation[m];
-            trace.log_likelihood -= 0.5 * e * e - instant.per_scale[m].ln();
-            trace.count += 1;
+            squares += instant.innovation[m] * instant.innovation[m];
+            density *= instant.per_scale[m];
         }
-        trace.instants.push(instant);
+        log_likelihood += density.ln() - 0.5 * squares;
+        each(instant);
         if !state.pose.position.x.is_finite() {
             return None;
         }
     }
-    Some(trace)
+    Some(log_likelihood)
 }
 
 /// What a row has; readings do not guide the very first steps, where the heading is a guess.
@@ -215,10 +253,7 @@ fn step(
         }
     }
     (instant.moved_to, instant.turned) = (motion.pose, motion.turned);
-    *state = State {
-        pose: motion.pose,
-        covariance,
-    };
+    *state = State::new(motion.pose, covariance);
     instant
 }
 
@@ -233,12 +268,11 @@ fn see(forecast: &Forecast<'_>, state: &mut State, row: &LogRow, usable: Used, i
     let slopes = camera_slopes(forecast, instant.seen_from, instant.seen);
     let missed = observed - instant.seen;
     for (m, missed) in [missed.x, missed.y].into_iter().enumerate() {
-        let already = difference(state.pose, instant.seen_from);
-        let expected: f64 = (0..3).map(|axis| slopes[m][axis] * already[axis]).sum();
         instant.slope[m] = slopes[m];
         (instant.innovation[m], instant.per_scale[m], instant.gain[m]) =
-            state.update(missed - expected, slopes[m], noise);
+            state.update(missed, slopes[m], noise);
     }
+    state.settle();
 }
 
 /// Change of the seen position with the pose.
@@ -246,10 +280,7 @@ fn camera_slopes(forecast: &Forecast<'_>, pose: Pose, seen: Vec2) -> [[f64; 3]; 
     const H: f64 = 1e-5;
     let mut slopes = [[0.0; 3]; 2];
     for axis in 0..3 {
-        let mut moved = State {
-            pose,
-            covariance: [[0.0; 3]; 3],
-        };
+        let mut moved = State::new(pose, [[0.0; 3]; 3]);
         let mut by = [0.0; 3];
         by[axis] = H;
         moved.shift(by);
@@ -285,13 +316,12 @@ fn sense(
             continue;
         }
         let slope = slope.map(|s| s * read.open);
-        let already = difference(state.pose, instant.sensed_from);
-        let expected: f64 = read.mean + (0..3).map(|axis| slope[axis] * already[axis]).sum::<f64>();
         let rest = (read.variance - pose_variance * read.open * read.open).max(1e-3 * read.variance);
         instant.slope[m] = slope;
         (instant.innovation[m], instant.per_scale[m], instant.gain[m]) =
-            state.update(row.readings[lane] - expected, slope, rest);
+            state.update(row.readings[lane] - read.mean, slope, rest);
     }
+    state.settle();
 }
 
 /// Which readings the poses of a trace let count: those whose ray is neither near the end of the range nor near the
@@ -306,10 +336,7 @@ pub(crate) fn clear_readings(world: &World<'_>, trace: &Trace, rows: &[LogRow]) 
         .map(|(i, (instant, row))| {
             let mut used = available(row, i);
             let turned = |by: f64| {
-                let mut state = State {
-                    pose: instant.moved_from,
-                    covariance: still,
-                };
+                let mut state = State::new(instant.moved_from, still);
                 state.shift([0.0, 0.0, by]);
                 state.pose
             };

@@ -125,9 +125,9 @@ pub(crate) fn pooled(assessment: &Assessment, count: usize) -> (DMatrix<f64>, DV
 
 /// The best size of an effect that jumps: trial sizes about `start`, then ever closer ones.
 pub(crate) fn hunt(evidence: &Evidence<'_>, setting: &Setting, spread: f64) -> Option<Fitted> {
-    let at = |size: f64| {
-        let settings = vec![Setting::constant(setting.spec, [size])];
-        evidence.assess(&settings, &[]).map(|found| (size, found))
+    let at = |size: f64| -> Option<(f64, f64)> {
+        let log_likelihood = evidence.likelihood(&[Setting::constant(setting.spec, [size])])?;
+        Some((size, log_likelihood))
     };
     let (Pattern::Constant(values), param) = (&setting.pattern, &setting.spec.params[0]) else {
         return None;
@@ -137,25 +137,24 @@ pub(crate) fn hunt(evidence: &Evidence<'_>, setting: &Setting, spread: f64) -> O
     for _ in 0..rounds(setting) {
         for side in [-1.0, -0.5, 0.5, 1.0] {
             let size = (best.0.min(values[0] * 4.0) + side * spread).clamp(param.low, param.high);
-            if let Some(found) = at(size).filter(|found| found.1.total() > best.1.total()) {
+            if let Some(found) = at(size).filter(|found| found.1 > best.1) {
                 best = found;
             }
         }
         spread *= 0.4;
     }
-    let mut fitted = fitted(
-        vec![Setting::constant(setting.spec, [best.0])],
-        Vec::new(),
-        best.1,
-    );
-    fitted.knobs = vec![Knob {
+    let knob = Knob {
         setting: 0,
         value: 0,
         slope: false,
         step: spread,
-    }];
-    fitted.standard_errors = vec![spread.max(0.004 * best.0)];
-    Some(fitted)
+    };
+    Some(Fitted {
+        settings: vec![Setting::constant(setting.spec, [best.0])],
+        knobs: vec![knob],
+        log_likelihood: best.1,
+        standard_errors: vec![spread.max(0.004 * best.0)],
+    })
 }
 
 fn rounds(setting: &Setting) -> usize {
