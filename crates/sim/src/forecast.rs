@@ -42,8 +42,10 @@ pub struct Forecast<'w> {
 enum Beside {
     /// In nothing.
     Nothing,
-    /// Walls, or what they send back, differ at places.
+    /// Walls, or what they send back, differ at places, along the sensors' axes.
     Places,
+    /// The same along each of a sensor's rays.
+    PlacesOnRays,
     /// Sensors respond otherwise.
     Responses,
     /// Rays go otherwise.
@@ -61,8 +63,9 @@ impl<'w> Forecast<'w> {
         Ok(forecast)
     }
 
-    /// The machine of a world with further effects, whose displacements of the walls count to first order; to be
-    /// compared with the world without them ([`Forecast::readings_beside`]).
+    /// The machine of a world with further effects, whose displacements of the walls count to first order and, like what
+    /// walls send back, along the sensors' axes; to be compared with the world without them
+    /// ([`Forecast::readings_beside`]).
     ///
     /// # Errors
     /// A further effect out of range, an effect without values for this run.
@@ -87,6 +90,9 @@ impl<'w> Forecast<'w> {
             },
         };
         forecast.compare(world)?;
+        if forecast.beside == Beside::PlacesOnRays {
+            forecast.beside = Beside::Places;
+        }
         Ok(forecast)
     }
 
@@ -113,10 +119,11 @@ impl<'w> Forecast<'w> {
         let places =
             self.apparatus.weighs_rays || others.iter().any(weighs) || !self.apparatus.displacing.is_empty();
         // A look knows one ray of a sensor.
-        let several = mine.beam.rays().len() > 1 && (responses || places);
+        let several = mine.beam.rays().len() > 1;
         self.beside = match () {
-            () if rays || several => Beside::Rays,
+            () if rays || several && responses => Beside::Rays,
             () if responses => Beside::Responses,
+            () if places && several => Beside::PlacesOnRays,
             () if places => Beside::Places,
             () => Beside::Nothing,
         };
@@ -164,7 +171,7 @@ impl<'w> Forecast<'w> {
             Beside::Nothing => look.response(),
             Beside::Places => self.apparatus.responses_where_met(look),
             Beside::Responses => self.apparatus.responses_again(look),
-            Beside::Rays => self.apparatus.outlook(pose, covariance).mean,
+            Beside::Rays | Beside::PlacesOnRays => self.apparatus.outlook(pose, covariance).mean,
         };
         self.change_readings(pose, &mut readings);
         readings

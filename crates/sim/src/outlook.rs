@@ -46,6 +46,7 @@ struct Glance {
 }
 
 /// Distances along eight rays, m, and what effects make of their responses.
+#[derive(PartialEq)]
 struct Met {
     distance_m: [f64; LANES],
     factor: [f64; LANES],
@@ -111,13 +112,21 @@ impl Apparatus<'_> {
         outlook
     }
 
-    /// The same responses from a look that one ray a sensor had before in a world whose sensors respond alike.
+    /// The same responses from the look that the rays along the axes had before in a world whose sensors respond alike.
     pub(crate) fn responses_where_met(&self, look: &Look) -> Readings {
         let met = self.met(&look.rays, &look.hits);
-        if met.distance_m == look.hits.distance_m && met.factor == look.factor {
-            return look.response;
+        let before = Met {
+            distance_m: look.hits.distance_m,
+            factor: look.factor,
+        };
+        if met == before {
+            look.response
+        } else if self.sights.len() == 1 {
+            self.responses_to(&met, look)
+        } else {
+            let (now, before) = (self.responses_to(&met, look), self.responses_to(&before, look));
+            std::array::from_fn(|lane| look.response[lane] + now[lane] - before[lane])
         }
-        self.responses_to(&met, look)
     }
 
     /// The same responses from a look that one ray a sensor had before.

@@ -124,10 +124,12 @@ struct Search<'a> {
     step: Option<f64>,
     step_gain: f64,
     steps: usize,
+    /// The last screening and its settings.
+    screened: Option<(Vec<Setting>, Screened<'a>)>,
 }
 
 /// Every run in its world, filtered, and the leads over them.
-type Screened<'a> = (Vec<(World<'a>, Trace)>, Vec<Lead>);
+type Screened<'a> = Arc<(Vec<(World<'a>, Trace)>, Vec<Lead>)>;
 
 impl<'a> Search<'a> {
     fn new(evidence: Evidence<'a>, step: Option<f64>) -> Result<Self, Error> {
@@ -155,6 +157,7 @@ impl<'a> Search<'a> {
             unlisted: None,
             step,
             step_gain,
+            screened: None,
         })
     }
 
@@ -163,16 +166,21 @@ impl<'a> Search<'a> {
     }
 
     /// The screening of all variants at given settings.
-    fn screen(&self, settings: &[Setting]) -> Option<Screened<'a>> {
+    fn screen(&mut self, settings: &[Setting]) -> Option<Screened<'a>> {
+        if let Some((_, found)) = self.screened.as_ref().filter(|last| last.0 == settings) {
+            return Some(Arc::clone(found));
+        }
         let traces = self.evidence.traces(settings)?;
         let normals = normals(&traces, &self.variants).ok()?;
         let leads = leads(&self.evidence, &self.variants, &normals);
-        Some((traces, leads))
+        let found = Arc::new((traces, leads));
+        self.screened = Some((settings.to_vec(), Arc::clone(&found)));
+        Some(found)
     }
 
     /// Single effects; `None` if there is nothing to explain, else the leads at the declared model.
     fn alone(&mut self) -> Option<Vec<Lead>> {
-        let (_, leads) = self.screen(&[])?;
+        let leads = self.screen(&[])?.1.clone();
         let noise = noises(&self.evidence, &[], self.total());
         self.p = by_chance(&noise).min(least_p(&leads));
         if self.p >= ALARM {
@@ -295,7 +303,7 @@ impl<'a> Search<'a> {
         if one.score() > best.max(4.0) {
             let left = self
                 .screen(&one.settings)
-                .map_or(f64::INFINITY, |(_, leads)| most(&leads));
+                .map_or(f64::INFINITY, |found| most(&found.1));
             if left < LEFT {
                 self.found.push(one);
             }
@@ -307,10 +315,11 @@ impl<'a> Search<'a> {
         let Some(best) = self.found.first().cloned() else {
             return;
         };
-        let Some((traces, leads)) = self.screen(&best.settings) else {
+        let Some(screened) = self.screen(&best.settings) else {
             return;
         };
-        self.settle(&traces, &leads, best.gain);
+        let (traces, leads) = &*screened;
+        self.settle(traces, leads, best.gain);
         let noise = noises(&self.evidence, &best.settings, self.total() + best.gain);
         let left = noise.iter().map(|n| n.gain).fold(0.0, f64::max) / best.gain.max(1e-9);
         if self.remainder.1.min(by_chance(&noise)) >= SIGNIFICANT_P || self.remainder.0.max(left) < FAULTS {
@@ -326,7 +335,7 @@ impl<'a> Search<'a> {
             more.extend(noise.map(|n| n.after(&best)));
         }
         if best.by == By::Constant {
-            more.extend(self.beside(&best, &leads));
+            more.extend(self.beside(&best, leads));
             more.extend(self.joint(first));
         }
         // Each further value must gain ten.
@@ -340,8 +349,8 @@ impl<'a> Search<'a> {
         self.found.extend(more);
         self.sort();
         let best = self.found[0].clone();
-        if let Some((traces, leads)) = self.screen(&best.settings) {
-            self.settle(&traces, &leads, best.gain);
+        if let Some(screened) = self.screen(&best.settings) {
+            self.settle(&screened.0, &screened.1, best.gain);
         }
     }
 
