@@ -4,7 +4,7 @@ use sim::{Setting, UNLISTED};
 
 use super::atlas::{Atlas, Simulate};
 use super::screen::Screened;
-use super::search::{Found, Search, sort};
+use super::search::{Found, Search, candidates, sort};
 use super::tests_of_fit::{FourNumbers, SIGNIFICANT_P};
 use crate::{Answer, Cause, Error, Explanation, Verdict};
 
@@ -79,7 +79,7 @@ impl Atlas {
             data: &data,
             residual: &residual,
         };
-        let found = explain(&search, &screened);
+        let mut found = explain(&search, &screened);
         let best = found.first().map(|best| &best.explanation);
         let verdict = best.map_or(Verdict::Unexplained, verdict_of);
         let indistinguishable = best.map_or(0, |best| {
@@ -89,12 +89,20 @@ impl Atlas {
                 |e: &Explanation| e.score > best.score - behind && e.effects.len() == best.effects.len();
             found.iter().take_while(|f| alike(&f.explanation)).count()
         });
+        let mut left_out = vec![Vec::new(); runs.len()];
+        if verdict != Verdict::Unexplained
+            && let Some(answer) = found.first_mut()
+        {
+            let look = self.look_closely(simulate, &data, &answer.hypothesis, &answer.errors);
+            let explanation = &mut answer.explanation;
+            explanation.effects = candidates(self, &look.found, &look.errors, explanation.gain);
+            left_out = if runs.len() > 1 {
+                self.leave_out(simulate, runs, &look)?
+            } else {
+                vec![explanation.settings(); runs.len()]
+            };
+        }
         let answer = found.first().filter(|_| verdict != Verdict::Unexplained);
-        let left_out = match answer {
-            Some(answer) if runs.len() > 1 => self.leave_out(simulate, runs, &answer.hypothesis)?,
-            Some(answer) => vec![answer.explanation.settings(); runs.len()],
-            None => vec![Vec::new(); runs.len()],
-        };
         let cause = answer.and_then(|answer| Cause::of(&answer.explanation.effects[0].setting));
         Ok(LapDiagnosis {
             residual: numbers,

@@ -51,6 +51,15 @@ pub(super) struct Freedom {
 }
 
 impl Freedom {
+    /// The same number over another step, if that is smaller; a step of nothing tells nothing.
+    pub(super) fn over(self, step: f64) -> Self {
+        let least = 1e-3 * self.step;
+        Self {
+            step: step.clamp(least, self.step),
+            ..self
+        }
+    }
+
     /// The run whose size this is, if it is one run's.
     pub(super) fn run(&self) -> Option<usize> {
         self.run

@@ -8,6 +8,7 @@ mod expectation;
 mod groups;
 mod hunt;
 mod hypothesis;
+mod last_look;
 mod layout;
 mod likelihood;
 mod pairs;

@@ -70,6 +70,7 @@ impl Atlas {
         let of_all = (2.0 * half as f64 / center.summaries.len() as f64).sqrt();
         for ((column, a), b) in columns.iter_mut().zip(part(0)).zip(part(half)) {
             column.doubt = (a.slope - b.slope) * (0.5 * of_all);
+            column.curvature_doubt = (a.curvature - b.curvature) * (0.5 * of_all);
         }
         Some(Local {
             center: center.expectation,
@@ -122,8 +123,9 @@ pub(super) struct Local {
 pub(super) struct Column {
     pub(super) slope: White,
     pub(super) curvature: White,
-    /// How the slope is off for the simulation's own error: one draw of it.
+    /// How the slope is off for the simulation's own error, and how the curvature is: one draw of each.
     pub(super) doubt: White,
+    curvature_doubt: White,
 }
 
 impl Column {
@@ -132,7 +134,21 @@ impl Column {
         Self {
             slope: &self.slope + &self.curvature * (2.0 * moved),
             curvature: self.curvature.clone(),
-            doubt: self.doubt.clone(),
+            doubt: &self.doubt + &self.curvature_doubt * (2.0 * moved),
+            curvature_doubt: self.curvature_doubt.clone(),
+        }
+    }
+
+    /// The same with a straight line for a curvature that is mostly noise.
+    pub(super) fn without_noise(self) -> Self {
+        const MOSTLY: f64 = 2.0;
+        if self.curvature.norm_squared() > MOSTLY * self.curvature_doubt.norm_squared() {
+            return self;
+        }
+        Self {
+            curvature: &self.slope * 0.0,
+            curvature_doubt: &self.slope * 0.0,
+            ..self
         }
     }
 
@@ -146,6 +162,7 @@ impl Column {
             return Self {
                 curvature: &slope * 0.0,
                 doubt: &slope * 0.0,
+                curvature_doubt: &slope * 0.0,
                 slope,
             };
         }
@@ -153,6 +170,7 @@ impl Column {
         let slope = &up.1 / b - &curvature * b;
         Self {
             doubt: &slope * 0.0,
+            curvature_doubt: &slope * 0.0,
             slope,
             curvature,
         }
@@ -170,9 +188,7 @@ pub(super) fn nearest(
     let mut normal = DMatrix::identity(count, count);
     for _ in 0..30 {
         let left = left_of(columns, target, &moves);
-        let slopes: Vec<White> = columns
-            .iter()
-            .zip(moves.iter())
+        let slopes: Vec<White> = (columns.iter().zip(moves.iter()))
             .map(|(c, m)| &c.slope + &c.curvature * (2.0 * m))
             .collect();
         normal = DMatrix::from_fn(count, count, |i, j| slopes[i].dot(&slopes[j]));
@@ -198,19 +214,33 @@ pub(super) fn nearest(
             break;
         }
     }
-    let covariance = covariance(columns, normal);
+    let there: Vec<Column> = (columns.iter().zip(moves.iter()))
+        .map(|(column, moved)| column.from(*moved))
+        .collect();
+    let covariance = covariance(&there, normal);
     (moves, covariance)
 }
 
-/// The covariance of moves with these normal equations. What is noise in the slopes tells nothing, and follows the data's.
+/// The covariance of moves with these normal equations. What is noise in the slopes tells nothing, and follows the data's:
+/// along the principal axes of the noise in the moves' own metric, information that is noise by a share n is worth
+/// (1 - n)^2 of itself.
 fn covariance(columns: &[Column], normal: DMatrix<f64>) -> DMatrix<f64> {
+    /// Noise of slopes is known from one draw: no direction is told to be noise altogether.
+    const MOST_NOISE: f64 = 0.9;
     let count = columns.len();
+    let Some(root) = normal.cholesky().map(|factor| factor.l()) else {
+        return DMatrix::identity(count, count);
+    };
     let noise = DMatrix::from_fn(count, count, |i, j| columns[i].doubt.dot(&columns[j].doubt));
-    let inverse = |matrix: DMatrix<f64>| matrix.cholesky().map(|factor| factor.inverse());
-    match inverse(&normal - noise) {
-        Some(without) => &without * normal * &without,
-        None => inverse(normal).unwrap_or_else(|| DMatrix::identity(count, count)),
-    }
+    let whitened = |matrix: &DMatrix<f64>| root.solve_lower_triangular(matrix);
+    let Some(noise) = whitened(&noise).and_then(|half| whitened(&half.transpose())) else {
+        return DMatrix::identity(count, count);
+    };
+    let axes = noise.symmetric_eigen();
+    let worth = axes.eigenvalues.map(|n| 1.0 - n.min(MOST_NOISE));
+    let wide = &axes.eigenvectors * DMatrix::from_diagonal(&worth.map(|worth| 1.0 / worth));
+    let moves = root.transpose().solve_upper_triangular(&wide).unwrap_or(wide);
+    &moves * moves.transpose()
 }
 
 /// What the parabolas at some moves leave of the target.
@@ -247,6 +277,7 @@ mod tests {
             slope: White::from_element(ENTRIES, 0.3) + noise(),
             curvature: White::zeros(ENTRIES),
             doubt: noise(),
+            curvature_doubt: White::zeros(ENTRIES),
         };
         let normal = DMatrix::from_element(1, 1, column.slope.norm_squared());
         let variance = covariance(&[column], normal)[(0, 0)];

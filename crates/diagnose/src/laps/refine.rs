@@ -2,7 +2,6 @@
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
-use sim::Setting;
 
 use super::atlas::{Atlas, Simulate, white};
 use super::expectation::Expectation;
@@ -12,7 +11,6 @@ use super::parabola::{Column, Local, left_of, nearest};
 use super::screen::price;
 use super::simulated::Evaluated;
 use super::tests_of_fit::FourNumbers;
-use crate::Error;
 
 /// What is simulated in a round of a descent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -57,13 +55,6 @@ pub(super) struct Settled {
     pub(super) evaluated: Evaluated,
 }
 
-impl Refined {
-    /// Standard errors of one part's values in the order of its pattern's values; 0 for what was not fitted.
-    pub(super) fn errors_of(&self, part: usize, atlas: &Atlas) -> Vec<f64> {
-        self.hypothesis.parts[part].errors(part, &self.errors, atlas)
-    }
-}
-
 /// A hypothesis on its way to its most likely sizes.
 #[derive(Debug, Clone)]
 pub(super) struct Descent {
@@ -72,6 +63,8 @@ pub(super) struct Descent {
     errors: Vec<f64>,
     /// Log-likelihood gained over the declared model less the price of the fitted numbers, as the last round saw it.
     pub(super) score: f64,
+    /// By how much the last round raised that.
+    pub(super) progress: f64,
     /// What it leaves, as the last round but a rough one saw it.
     pub(super) remainder: Option<FourNumbers>,
     /// What was seen about it, and the moves since.
@@ -94,6 +87,7 @@ impl Descent {
             hypothesis: hypothesis.clone(),
             errors: vec![f64::INFINITY; freedoms.len()],
             score: f64::NEG_INFINITY,
+            progress: f64::INFINITY,
             remainder: None,
             near: None,
             looks: 0,
@@ -178,8 +172,10 @@ impl Atlas {
             let reach = (10.0 * errors[i]).max(moves[i].abs());
             freedom.step = reach.clamp(0.2 * freedom.step, freedom.step);
         }
+        let score = hypothesis.worth(fit.gain) - self.price_of(&hypothesis);
         Some(Descent {
-            score: hypothesis.worth(fit.gain) - self.price_of(&hypothesis),
+            score,
+            progress: score - descent.score,
             near: Some((local, moves)),
             looks: looks + 1,
             holds,
@@ -226,6 +222,7 @@ impl Atlas {
         let moved = moved + moves;
         Some(Descent {
             score,
+            progress: score - descent.score,
             remainder: Some(FourNumbers::new(&fit.residual, &self.layout)),
             holds: holds && are_within_steps(&moved, &freedoms),
             near: Some((local, moved)),
@@ -238,7 +235,12 @@ impl Atlas {
         })
     }
 
-    fn with_moves(&self, hypothesis: &Hypothesis, freedoms: &[Freedom], moves: &DVector<f64>) -> Hypothesis {
+    pub(super) fn with_moves(
+        &self,
+        hypothesis: &Hypothesis,
+        freedoms: &[Freedom],
+        moves: &DVector<f64>,
+    ) -> Hypothesis {
         let by: Vec<(Freedom, f64)> = freedoms.iter().copied().zip(moves.iter().copied()).collect();
         hypothesis.moved(self, &by)
     }
@@ -247,71 +249,6 @@ impl Atlas {
     fn sets_around(&self, freedoms: &[Freedom], round: Round) -> u64 {
         let points = 2 * freedoms.len() as u64 + 1;
         self.enough(round.sets(points), points)
-    }
-
-    /// For each run the effects with sizes fitted to the other runs alone, by the parabolas about the hypothesis' sizes; a
-    /// size of the run itself becomes the mean of the others'. Where the robot crashes beside these sizes, they stay.
-    pub(super) fn leave_out(
-        &self,
-        simulate: &Simulate<'_>,
-        runs: &[Vec<track::Lap>],
-        hypothesis: &Hypothesis,
-    ) -> Result<Vec<Vec<Setting>>, Error> {
-        let freedoms = hypothesis.freedoms(self);
-        let local = self.local(
-            simulate,
-            hypothesis,
-            &freedoms,
-            self.sets_around(&freedoms, Round::Full),
-        );
-        let fit_without = |run: usize| {
-            let found = match &local {
-                Some(local) => self.fit_without(simulate, run, local, runs, hypothesis, &freedoms)?,
-                None => hypothesis.clone(),
-            };
-            Ok(found.with_mean_size(run).settings(self))
-        };
-        (0..self.layout.runs()).map(fit_without).collect()
-    }
-
-    fn fit_without(
-        &self,
-        simulate: &Simulate<'_>,
-        run: usize,
-        local: &Local,
-        runs: &[Vec<track::Lap>],
-        hypothesis: &Hypothesis,
-        freedoms: &[Freedom],
-    ) -> Result<Hypothesis, Error> {
-        let (recording, place) = self.layout.places().nth(run).unwrap_or_default();
-        let alone = self.layout.laps[recording].len() == 1;
-        let mut data = self.observed(runs)?;
-        if !alone {
-            data.0[recording] = self.observed_without(runs, run)?.0.remove(recording);
-        }
-        data.0[recording]
-            .means
-            .insert(place, local.center.0[recording].means[place].clone());
-        if alone {
-            data.0[recording].means.truncate(1);
-        }
-        let target = white(&local.scatter, &self.layout, &data, &local.center);
-        let mut own = vec![self.layout.run(run)];
-        if alone {
-            own.extend([self.layout.trend(recording), self.layout.second(recording)]);
-        }
-        let mut columns = local.columns.clone();
-        for column in &mut columns {
-            for range in &own {
-                column.slope.rows_mut(range.start, range.len()).fill(0.0);
-                column.curvature.rows_mut(range.start, range.len()).fill(0.0);
-            }
-        }
-        let (moves, _) = nearest(&columns, &target, freedoms);
-        let found = self.with_moves(hypothesis, freedoms, &moves);
-        // The run itself is as expected, and so has no say.
-        let hunted = self.hunt_about(simulate, &data, &found).unwrap_or(found);
-        Ok(self.quantised(hunted))
     }
 
     /// A hypothesis at its most likely sizes, simulated often enough to judge it; `None` where the robot crashes, and where
@@ -383,7 +320,7 @@ impl Atlas {
     }
 
     /// Sizes that come in steps brought to the nearest.
-    fn quantised(&self, mut hypothesis: Hypothesis) -> Hypothesis {
+    pub(super) fn quantised(&self, mut hypothesis: Hypothesis) -> Hypothesis {
         for part in &mut hypothesis.parts {
             let probe = &self.probes[part.probe];
             if let Some(quantum) = probe.quantum {
@@ -398,7 +335,7 @@ impl Atlas {
 }
 
 /// Standard errors of numbers with a covariance, the simulation's own error included.
-fn errors_of(covariance: &DMatrix<f64>, doubt: Doubt) -> Vec<f64> {
+pub(super) fn errors_of(covariance: &DMatrix<f64>, doubt: Doubt) -> Vec<f64> {
     let variances = covariance.diagonal() * (1.0 + doubt.error);
     variances.iter().map(|variance| variance.sqrt()).collect()
 }

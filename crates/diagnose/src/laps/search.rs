@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::atlas::{Atlas, Simulate, White};
 use super::expectation::Expectation;
 use super::hunt::Hunt;
-use super::hypothesis::{Hypothesis, Part, Shape};
+use super::hypothesis::{Freedom, Hypothesis, Part, Shape};
 use super::refine::{CLOSE_SETS, Descent, Round, Settled};
 use super::screen::Screened;
 use super::simulated::FINAL_SETS;
@@ -17,6 +17,8 @@ use crate::{Candidate, Explanation};
 #[derive(Debug, Clone)]
 pub(super) struct Found {
     pub(super) hypothesis: Hypothesis,
+    /// Standard errors of its fitted numbers.
+    pub(super) errors: Vec<(Freedom, f64)>,
     pub(super) explanation: Explanation,
     /// Standard deviation of its log-likelihood for the simulation's own error.
     pub(super) gain_error: f64,
@@ -267,12 +269,11 @@ impl Search<'_> {
         rounds: &[(Round, f64, f64)],
         reached: f64,
     ) -> Vec<Descent> {
-        /// Descents that go on where none seems to come to an end.
+        /// Descents that go on where none seems to come to an end, or the others seem to lose.
         const FEW: usize = 3;
         let mut alive: Vec<Descent> = hypotheses
             .map(|start| Descent::start(self.atlas, start))
             .collect();
-        let mut before = 0.0;
         for &(round, behind, share) in rounds {
             alive = (alive.into_par_iter())
                 .filter_map(|descent| self.atlas.descend(self.simulate, self.data, descent, round))
@@ -281,18 +282,23 @@ impl Search<'_> {
             let Some(first) = alive.first() else {
                 break;
             };
-            let best = first.score;
-            let hopeless = is_hopeless(first, best - before);
+            let (best, hopeless, fits) = (first.score, is_hopeless(first), fits(first));
             let bar = best.max(reached);
             alive.retain(|d| d.score >= bar - behind.max(share * bar));
             alive = self.without_repeats(alive);
+            if fits {
+                let mut place = 0;
+                alive.retain(|descent| {
+                    place += 1;
+                    place <= FEW || may_catch_up(descent, best)
+                });
+            }
             if hopeless && round == Round::Full {
                 break;
             }
             if hopeless {
                 alive.truncate(FEW);
             }
-            before = best;
         }
         alive
     }
@@ -366,29 +372,15 @@ impl Search<'_> {
     fn found(&self, settled: &Settled) -> Found {
         let Settled { refined, evaluated } = settled;
         let atlas = self.atlas;
-        let settings = refined.hypothesis.settings(atlas);
-        let mut effects: Vec<(f64, Candidate)> = (settings.into_iter().enumerate())
-            .map(|(part, setting)| {
-                let errors: Vec<f64> = refined.errors_of(part, atlas);
-                let fitted = errors.iter().filter(|e| **e > 0.0).count();
-                let candidate = Candidate {
-                    setting,
-                    standard_errors: errors,
-                    gain: refined.fit.gain,
-                    fitted,
-                };
-                (refined.hypothesis.weight(part, atlas), candidate)
-            })
-            .collect();
-        effects.sort_by(|a, b| b.0.total_cmp(&a.0));
         let excess = |squares: f64| squares - self.residual.len() as f64;
         let remainder = FourNumbers::new(&refined.fit.residual, &atlas.layout);
         Found {
             gain_error: refined.fit.gain_error,
             left: atlas.white(self.data, &evaluated.expectation),
             hypothesis: refined.hypothesis.clone(),
+            errors: refined.errors.clone(),
             explanation: Explanation {
-                effects: effects.into_iter().map(|(_, candidate)| candidate).collect(),
+                effects: candidates(atlas, &refined.hypothesis, &refined.errors, refined.fit.gain),
                 score: refined.score,
                 gain: refined.fit.gain,
                 share: 1.0
@@ -400,11 +392,48 @@ impl Search<'_> {
     }
 }
 
+/// The effects of a hypothesis with the errors of its numbers, that of the largest action first.
+pub(super) fn candidates(
+    atlas: &Atlas,
+    hypothesis: &Hypothesis,
+    errors: &[(Freedom, f64)],
+    gain: f64,
+) -> Vec<Candidate> {
+    let settings = hypothesis.settings(atlas);
+    let mut effects: Vec<(f64, Candidate)> = (settings.into_iter().enumerate())
+        .map(|(part, setting)| {
+            let standard_errors = hypothesis.parts[part].errors(part, errors, atlas);
+            let candidate = Candidate {
+                setting,
+                gain,
+                fitted: standard_errors.iter().filter(|e| **e > 0.0).count(),
+                standard_errors,
+            };
+            (hypothesis.weight(part, atlas), candidate)
+        })
+        .collect();
+    effects.sort_by(|a, b| b.0.total_cmp(&a.0));
+    effects.into_iter().map(|(_, candidate)| candidate).collect()
+}
+
+/// Progress of a round, as a share of what is missing, with which a descent does not arrive.
+const SLOW: f64 = 0.1;
+
 /// Whether the best descent leaves far too much and does not get on: more rounds would not make an answer of it.
-fn is_hopeless(descent: &Descent, progress: f64) -> bool {
-    const SLOW: f64 = 0.1;
+fn is_hopeless(descent: &Descent) -> bool {
     leaves_far_too_much(descent)
-        && (descent.remainder).is_some_and(|left| progress < SLOW * 0.5 * left.excess())
+        && (descent.remainder).is_some_and(|left| descent.progress < SLOW * 0.5 * left.excess())
+}
+
+/// Whether a descent is near a better one, or comes nearer.
+fn may_catch_up(descent: &Descent, best: f64) -> bool {
+    const NEAR: f64 = 25.0;
+    let missing = best - descent.score;
+    missing < NEAR || descent.progress > SLOW * missing
+}
+
+fn fits(descent: &Descent) -> bool {
+    (descent.remainder).is_some_and(|left| left.omnibus_p() >= SIGNIFICANT_P)
 }
 
 fn leaves_far_too_much(descent: &Descent) -> bool {

@@ -1,0 +1,137 @@
+//! The last look about the answer: its sizes, their errors, and the sizes without each of the runs.
+
+use sim::Setting;
+
+use super::atlas::{Atlas, Simulate, white};
+use super::expectation::Expectation;
+use super::hypothesis::{Freedom, Hypothesis};
+use super::parabola::{Column, Local, nearest};
+use super::refine::errors_of;
+use crate::Error;
+
+/// A hypothesis at its most likely sizes, as parabolas over a few of their errors tell them.
+pub(super) struct LastLook {
+    pub(super) found: Hypothesis,
+    /// Standard errors of the fitted numbers, the simulation's own error included.
+    pub(super) errors: Vec<(Freedom, f64)>,
+    /// What was looked about, in which numbers, and what was seen; `None` where nothing is fitted or the robot crashes.
+    about: Hypothesis,
+    freedoms: Vec<Freedom>,
+    local: Option<Local>,
+}
+
+/// Looks at most: sizes that leave the parabolas are looked about again.
+const LOOKS: usize = 2;
+/// Standard errors that a parabola reaches to either side.
+const REACH: f64 = 3.0;
+
+impl Atlas {
+    /// Looks closely about a hypothesis whose numbers have these errors.
+    pub(super) fn look_closely(
+        &self,
+        simulate: &Simulate<'_>,
+        data: &Expectation,
+        hypothesis: &Hypothesis,
+        errors: &[(Freedom, f64)],
+    ) -> LastLook {
+        let mut look = LastLook {
+            found: hypothesis.clone(),
+            errors: errors.to_vec(),
+            about: hypothesis.clone(),
+            freedoms: Vec::new(),
+            local: None,
+        };
+        for _ in 0..LOOKS {
+            let freedoms: Vec<Freedom> = look
+                .errors
+                .iter()
+                .map(|(f, error)| f.over(REACH * error))
+                .collect();
+            let points = 2 * freedoms.len() as u64 + 1;
+            let sets = self.enough(sets_at(points), points);
+            let Some(mut local) = self.local(simulate, &look.found, &freedoms, sets) else {
+                break;
+            };
+            local.columns = local.columns.into_iter().map(Column::without_noise).collect();
+            let target = white(&local.scatter, &self.layout, data, &local.center);
+            let (moves, covariance) = nearest(&local.columns, &target, &freedoms);
+            let found = self.quantised(self.with_moves(&look.found, &freedoms, &moves));
+            let errors = errors_of(&covariance, local.doubt);
+            let holds = (moves.iter().zip(&freedoms)).all(|(moved, freedom)| moved.abs() <= freedom.step);
+            look = LastLook {
+                errors: freedoms.iter().copied().zip(errors).collect(),
+                about: std::mem::replace(&mut look.found, found.clone()),
+                found,
+                freedoms,
+                local: Some(local),
+            };
+            if holds {
+                break;
+            }
+        }
+        look
+    }
+
+    /// For each run the effects with sizes fitted to the other runs alone, by the parabolas of the last look; a
+    /// size of the run itself becomes the mean of the others'. Where the robot crashes beside the sizes, they stay.
+    pub(super) fn leave_out(
+        &self,
+        simulate: &Simulate<'_>,
+        runs: &[Vec<track::Lap>],
+        look: &LastLook,
+    ) -> Result<Vec<Vec<Setting>>, Error> {
+        let fit_without = |run: usize| {
+            let found = match &look.local {
+                Some(local) => self.fit_without(simulate, run, local, runs, look)?,
+                None => look.found.clone(),
+            };
+            Ok(found.with_mean_size(run).settings(self))
+        };
+        (0..self.layout.runs()).map(fit_without).collect()
+    }
+
+    fn fit_without(
+        &self,
+        simulate: &Simulate<'_>,
+        run: usize,
+        local: &Local,
+        runs: &[Vec<track::Lap>],
+        look: &LastLook,
+    ) -> Result<Hypothesis, Error> {
+        let (recording, place) = self.layout.places().nth(run).unwrap_or_default();
+        let alone = self.layout.laps[recording].len() == 1;
+        let mut data = self.observed(runs)?;
+        if !alone {
+            data.0[recording] = self.observed_without(runs, run)?.0.remove(recording);
+        }
+        data.0[recording]
+            .means
+            .insert(place, local.center.0[recording].means[place].clone());
+        if alone {
+            data.0[recording].means.truncate(1);
+        }
+        let target = white(&local.scatter, &self.layout, &data, &local.center);
+        let mut own = vec![self.layout.run(run)];
+        if alone {
+            own.extend([self.layout.trend(recording), self.layout.second(recording)]);
+        }
+        let mut columns = local.columns.clone();
+        for column in &mut columns {
+            for range in &own {
+                column.slope.rows_mut(range.start, range.len()).fill(0.0);
+                column.curvature.rows_mut(range.start, range.len()).fill(0.0);
+            }
+        }
+        let (moves, _) = nearest(&columns, &target, &look.freedoms);
+        let found = self.with_moves(&look.about, &look.freedoms, &moves);
+        // The run itself is as expected, and so has no say.
+        let hunted = self.hunt_about(simulate, &data, &found).unwrap_or(found);
+        Ok(self.quantised(hunted))
+    }
+}
+
+/// Data sets at each of so many points.
+fn sets_at(points: u64) -> u64 {
+    const OF_ALL: u64 = 100;
+    (OF_ALL / points).clamp(6, 32)
+}
