@@ -6,7 +6,7 @@ use super::atlas::{Atlas, Simulate, white};
 use super::expectation::Expectation;
 use super::hypothesis::{Freedom, Hypothesis};
 use super::parabola::{Column, Local, nearest};
-use super::refine::errors_of;
+use super::refine::{are_within_steps, errors_of};
 use crate::Error;
 
 /// A hypothesis at its most likely sizes, as parabolas over a few of their errors tell them.
@@ -20,8 +20,10 @@ pub(super) struct LastLook {
     local: Option<Local>,
 }
 
-/// Looks at most: sizes that leave the parabolas are looked about again.
+/// Looks at most: sizes that leave the parabolas, or turn out less certain, are looked about again.
 const LOOKS: usize = 2;
+/// Errors, as multiples of those that a look was made for, with which it was too narrow.
+const LESS_CERTAIN: f64 = 2.0;
 /// Standard errors that a parabola reaches to either side.
 const REACH: f64 = 3.0;
 
@@ -41,11 +43,10 @@ impl Atlas {
             freedoms: Vec::new(),
             local: None,
         };
+        let widest = hypothesis.freedoms(self);
         for _ in 0..LOOKS {
-            let freedoms: Vec<Freedom> = look
-                .errors
-                .iter()
-                .map(|(f, error)| f.over(REACH * error))
+            let freedoms: Vec<Freedom> = (widest.iter().zip(&look.errors))
+                .map(|(widest, (_, error))| widest.over(REACH * error))
                 .collect();
             let points = 2 * freedoms.len() as u64 + 1;
             let sets = self.enough(sets_at(points), points);
@@ -57,7 +58,12 @@ impl Atlas {
             let (moves, covariance) = nearest(&local.columns, &target, &freedoms);
             let found = self.quantised(self.with_moves(&look.found, &freedoms, &moves));
             let errors = errors_of(&covariance, local.doubt);
-            let holds = (moves.iter().zip(&freedoms)).all(|(moved, freedom)| moved.abs() <= freedom.step);
+            let certain = (errors.iter().zip(&freedoms))
+                .zip(&widest)
+                .all(|((error, freedom), widest)| {
+                    freedom.step == widest.step || REACH * error < LESS_CERTAIN * freedom.step
+                });
+            let holds = certain && are_within_steps(&moves, &freedoms);
             look = LastLook {
                 errors: freedoms.iter().copied().zip(errors).collect(),
                 about: std::mem::replace(&mut look.found, found.clone()),

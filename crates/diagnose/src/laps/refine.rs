@@ -341,7 +341,7 @@ pub(super) fn errors_of(covariance: &DMatrix<f64>, doubt: Doubt) -> Vec<f64> {
 }
 
 /// Whether numbers stayed where their parabolas were made.
-fn are_within_steps(moves: &DVector<f64>, freedoms: &[Freedom]) -> bool {
+pub(super) fn are_within_steps(moves: &DVector<f64>, freedoms: &[Freedom]) -> bool {
     (moves.iter().zip(freedoms)).all(|(moved, freedom)| moved.abs() < freedom.step)
 }
 
