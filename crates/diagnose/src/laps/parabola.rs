@@ -228,6 +228,9 @@ fn covariance(columns: &[Column], normal: DMatrix<f64>) -> DMatrix<f64> {
     /// Noise of slopes is known from one draw: no direction is told to be noise altogether.
     const MOST_NOISE: f64 = 0.9;
     let count = columns.len();
+    if count == 0 {
+        return normal;
+    }
     let Some(root) = normal.cholesky().map(|factor| factor.l()) else {
         return DMatrix::identity(count, count);
     };
@@ -266,6 +269,12 @@ mod tests {
     use sim::Streams;
 
     use super::*;
+
+    #[test]
+    fn without_numbers_nothing_moves() {
+        let (moves, covariance) = nearest(&[], &White::from_element(5, 1.0), &[]);
+        assert!(moves.is_empty() && covariance.is_empty());
+    }
 
     #[test]
     fn noise_in_a_slope_is_no_information() {
