@@ -4,10 +4,10 @@ use std::sync::Arc;
 
 use track::Vec2;
 
-use crate::cast::Rays;
-use crate::effects::{Active, Stage};
+use crate::cast::{Hits, Rays};
+use crate::effects::{Active, Hit, Moment, Stage};
 use crate::world::{Geometry, World, altered};
-use crate::{Error, Machine, Setting};
+use crate::{Error, Machine, Pose, Readings, Setting};
 
 /// The rays that one ray of the beam makes on all eight sensors, in the body frame.
 #[derive(Debug, Clone, Copy)]
@@ -60,7 +60,11 @@ impl<'w> Apparatus<'w> {
 
     /// Whether walls or sensors may move in time.
     pub(crate) fn moves(&self) -> bool {
-        self.remade || self.cutting.iter().any(Active::drifts)
+        self.remade || self.walls_drift()
+    }
+
+    fn walls_drift(&self) -> bool {
+        self.cutting.iter().any(Active::drifts)
     }
 
     /// Goes to the next control step, which begins at `time_s` since the run began.
@@ -92,11 +96,64 @@ impl<'w> Apparatus<'w> {
 
     /// Brings the walls up to date, where they move or rays go farther than they were prepared for.
     fn cut(&mut self, time_s: f64) {
-        if self.cutting.iter().any(Active::drifts) || self.machine.range_m > self.geometry.range_m {
+        if self.walls_drift() || self.machine.range_m > self.geometry.range_m {
             self.cutting.iter_mut().for_each(|active| active.advance(time_s));
             let scene = self.world.scene;
             self.geometry = scene.geometry_from(&self.geometry, &self.cutting, &self.machine);
         }
+    }
+
+    /// Where the camera sees the robot, before its noise, m.
+    #[inline]
+    pub(crate) fn observed(&self, now: &Moment) -> Vec2 {
+        let see = |position, active: &Active| active.effect.observed(&active.values, now, position);
+        self.effects.iter().fold(now.pose.position, see)
+    }
+
+    /// What effects make of the readings, before noise.
+    #[inline]
+    pub(crate) fn change_readings(&mut self, now: &Moment, readings: &mut Readings) {
+        for active in &mut self.effects {
+            active
+                .effect
+                .readings(&active.values, now, &self.machine, readings);
+        }
+    }
+
+    /// The rays of a sight from a pose and what they hit.
+    #[inline]
+    pub(crate) fn cast(&self, pose: Pose, sight: &Sight) -> (Rays, Hits) {
+        let rays = sight.rays.placed(pose);
+        let Geometry { caster, walls, .. } = &*self.geometry;
+        let hits = caster.cast(walls, pose.position, &rays);
+        (rays, hits)
+    }
+
+    /// What the effects make of one ray's response.
+    pub(crate) fn ray_factor(&self, rays: &Rays, hits: &Hits, lane: usize) -> f64 {
+        self.factor_of(&self.hit(rays, hits, lane).0)
+    }
+
+    /// What the effects make of the response to a hit.
+    pub(crate) fn factor_of(&self, hit: &Hit) -> f64 {
+        (self.effects.iter())
+            .map(|active| active.effect.ray_factor(&active.values, hit))
+            .product()
+    }
+
+    /// Where one ray met a wall, and the ray's direction along the wall's normal.
+    pub(crate) fn hit(&self, rays: &Rays, hits: &Hits, lane: usize) -> (Hit, f64) {
+        let (walls, segment) = (&self.geometry.walls, hits.segment[lane] as usize);
+        let (direction, distance_m) = (rays.direction(lane), hits.distance_m[lane]);
+        let towards = walls.normal(segment).dot(direction);
+        let place = walls.place(segment, rays.origin(lane) + direction * distance_m);
+        let hit = Hit {
+            sensor: lane,
+            distance_m,
+            cos_incidence: towards.abs().min(1.0),
+            site: self.world.scene.site(place),
+        };
+        (hit, towards)
     }
 }
 

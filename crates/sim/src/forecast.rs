@@ -29,7 +29,6 @@ pub struct Motion {
 /// [`Forecast::readings`] and [`Forecast::motion`] is called once per control step, in order, after [`Forecast::tick`].
 #[derive(Debug)]
 pub struct Forecast<'w> {
-    world: &'w World<'w>,
     apparatus: Apparatus<'w>,
     beside: Beside,
     /// What comes through of a small change of the readings; `None` for all of it.
@@ -75,7 +74,6 @@ impl<'w> Forecast<'w> {
             .enumerate()
             .try_for_each(|(i, setting)| setting.check(i))?;
         let mut forecast = Self {
-            world,
             apparatus: Apparatus::new(world, further)?,
             beside: Beside::Nothing,
             through: None,
@@ -143,9 +141,7 @@ impl<'w> Forecast<'w> {
 
     /// Where the camera sees a pose, before its noise, m.
     pub fn observed(&self, pose: Pose) -> Vec2 {
-        let now = Moment { pose, ..self.now };
-        let see = |position, active: &Active| active.effect.observed(&active.values, &now, position);
-        self.apparatus.effects.iter().fold(pose.position, see)
+        self.apparatus.observed(&Moment { pose, ..self.now })
     }
 
     /// Expected readings at a pose with this covariance, to second order in the distance.
@@ -181,14 +177,10 @@ impl<'w> Forecast<'w> {
     fn change_readings(&mut self, pose: Pose, readings: &mut Readings) {
         let now = Moment {
             pose,
-            step_s: self.world.rules().control_step_s,
+            step_s: self.apparatus.world.rules().control_step_s,
             ..self.now
         };
-        for active in &mut self.apparatus.effects {
-            active
-                .effect
-                .readings(&active.values, &now, &self.apparatus.machine, readings);
-        }
+        self.apparatus.change_readings(&now, readings);
     }
 
     /// The motion of one control step without slip, and the covariance that slip adds.
@@ -201,7 +193,7 @@ impl<'w> Forecast<'w> {
             count += 1;
         });
         // Beyond so many physics steps the last stands for all that follow.
-        let step_s = self.world.rules().control_step_s / count as f64;
+        let step_s = self.apparatus.world.rules().control_step_s / count as f64;
         let covariance = self.slip_covariance(&pushes[..count.min(MOST)], end.position, step_s);
         Motion {
             pose: end,
@@ -224,7 +216,7 @@ impl<'w> Forecast<'w> {
         command: WheelSpeeds,
         mut each: impl FnMut(Pose, WheelSpeeds),
     ) -> (Pose, Vec2) {
-        let rules = self.world.rules();
+        let rules = self.apparatus.world.rules();
         let step_s = rules.control_step_s / f64::from(rules.physics_steps);
         let start_s = self.now.time_s;
         let mut now = Moment {
@@ -302,7 +294,7 @@ impl<'w> Forecast<'w> {
     /// one difference from a second chain of effects, at its second reading, is exact.
     fn passage(&self) -> Result<Option<[[f64; LANES]; LANES]>, Error> {
         let second = |lane: Option<usize>| -> Result<Readings, Error> {
-            let mut effects = Active::all(&self.world.model.effects, self.world.run)?;
+            let mut effects = Active::all(&self.apparatus.world.model.effects, self.apparatus.world.run)?;
             let mut readings = [100.0; LANES];
             for step in 0..2 {
                 readings = [100.0; LANES];

@@ -2,7 +2,6 @@
 
 use crate::apparatus::Apparatus;
 use crate::cast::{Hits, LANES, Rays};
-use crate::effects::Hit;
 use crate::forecast::PoseMatrix;
 use crate::{Combine, Pose, Readings, Response};
 
@@ -78,11 +77,7 @@ impl Apparatus<'_> {
         };
         let middle = self.sights.len() / 2;
         for (number, sight) in self.sights.iter().enumerate() {
-            let rays = sight.rays.placed(pose);
-            let hits = self
-                .geometry
-                .caster
-                .cast(&self.geometry.walls, pose.position, &rays);
+            let (rays, hits) = self.cast(pose, sight);
             let met = self.met(&rays, &hits);
             if number == middle {
                 (outlook.look.rays, outlook.look.hits) = (rays, hits);
@@ -166,28 +161,14 @@ impl Apparatus<'_> {
 
     /// Distance along one ray and what effects make of its response.
     fn met_by(&self, rays: &Rays, hits: &Hits, lane: usize) -> (f64, f64) {
-        let distance_m = hits.distance_m[lane];
-        let (walls, segment) = (&self.geometry.walls, hits.segment[lane] as usize);
-        let direction = rays.direction(lane);
-        let towards = walls.normal(segment).dot(direction);
-        let place = walls.place(segment, rays.origin(lane) + direction * distance_m);
-        let hit = Hit {
-            sensor: lane,
-            distance_m,
-            cos_incidence: towards.abs().min(1.0),
-            site: self.world.scene.site(place),
-        };
-        let factor = self
-            .effects
-            .iter()
-            .map(|active| active.effect.ray_factor(&active.values, &hit))
-            .product();
-        let moved_m: f64 = self
-            .displacing
-            .iter()
+        let (hit, towards) = self.hit(rays, hits, lane);
+        let moved_m: f64 = (self.displacing.iter())
             .map(|active| active.effect.displacement_m(&active.values, &hit.site))
             .sum();
-        (distance_m + moved_m / not_grazing(towards), factor)
+        (
+            hit.distance_m + moved_m / not_grazing(towards),
+            self.factor_of(&hit),
+        )
     }
 
     /// Adds one ray's share: of the reading, or of the shortfall from the range where a sensor averages distances.

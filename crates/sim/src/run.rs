@@ -2,9 +2,9 @@
 
 use track::{Lap, LapTracker, Vec2, Way};
 
-use crate::apparatus::{Apparatus, Sight};
-use crate::cast::{Hits, LANES, Rays};
-use crate::effects::{Hit, Moment};
+use crate::apparatus::Apparatus;
+use crate::cast::LANES;
+use crate::effects::Moment;
 use crate::noise::{Stream, Streams};
 use crate::sensor::Combine;
 use crate::world::World;
@@ -26,7 +26,6 @@ pub struct Step {
 /// Everything that changes while a robot drives.
 #[derive(Debug)]
 pub struct Run<'w> {
-    world: &'w World<'w>,
     apparatus: Apparatus<'w>,
     pose: Pose,
     command: WheelSpeeds,
@@ -56,7 +55,6 @@ impl<'w> Run<'w> {
         let center = gates[gate].center + gates[gate].left * offset_m;
         let pose = Pose::new(center.x, center.y, forward.y.atan2(forward.x) + turn_rad);
         let mut run = Self {
-            world,
             apparatus: Apparatus::new(world, &[])?,
             pose,
             command: WheelSpeeds::default(),
@@ -84,16 +82,16 @@ impl<'w> Run<'w> {
 
     /// Drives for one control step.
     pub fn step(&mut self) -> Step {
-        let time_s = self.steps as f64 * self.world.rules().control_step_s;
+        let time_s = self.steps as f64 * self.apparatus.world.rules().control_step_s;
         self.apparatus.advance(time_s);
         let mut now = Moment {
             time_s,
-            step_s: self.world.rules().control_step_s,
+            step_s: self.apparatus.world.rules().control_step_s,
             pose: self.pose,
             command: self.command,
             gate: self.next_gate,
-            gate_count: self.world.circuit().gates.len(),
-            arena_middle: self.world.arena_middle(),
+            gate_count: self.apparatus.world.circuit().gates.len(),
+            arena_middle: self.apparatus.world.arena_middle(),
         };
         let observed = self.observe(&now);
         let readings = self.sense(&now);
@@ -116,13 +114,7 @@ impl<'w> Run<'w> {
     /// Where the camera sees the robot.
     #[inline]
     fn observe(&mut self, now: &Moment) -> Vec2 {
-        let seen = self
-            .apparatus
-            .effects
-            .iter()
-            .fold(self.pose.position, |position, active| {
-                active.effect.observed(&active.values, now, position)
-            });
+        let seen = self.apparatus.observed(now);
         let noise_m = self.apparatus.machine.camera_noise_m;
         let (x, y) = (self.camera.normal(), self.camera.normal());
         seen + Vec2::new(x, y) * noise_m
@@ -134,11 +126,7 @@ impl<'w> Run<'w> {
         // Drawn first: the processor casts the rays meanwhile.
         let normals: Readings = std::array::from_fn(|_| self.sense.normal());
         let mut readings = self.responses();
-        for active in &mut self.apparatus.effects {
-            active
-                .effect
-                .readings(&active.values, now, &self.apparatus.machine, &mut readings);
-        }
+        self.apparatus.change_readings(now, &mut readings);
         let noise = self.apparatus.machine.noise;
         for (reading, normal) in readings.iter_mut().zip(normals) {
             *reading += noise.deviation(*reading) * normal;
@@ -167,14 +155,14 @@ impl<'w> Run<'w> {
         } = &self.apparatus.machine;
         let mut total = [0.0; LANES];
         for sight in &self.apparatus.sights {
-            let (rays, hits) = self.look(sight);
+            let (rays, hits) = self.apparatus.cast(self.pose, sight);
             let mut values = response.readings(&hits.distance_m);
             for (value, distance_m) in values.iter_mut().zip(hits.distance_m) {
                 *value = if distance_m <= *range_m { *value } else { 0.0 };
             }
             if self.apparatus.weighs_rays {
                 for lane in (0..LANES).filter(|&lane| hits.distance_m[lane] <= *range_m) {
-                    values[lane] *= self.ray_factor(&rays, &hits, lane);
+                    values[lane] *= self.apparatus.ray_factor(&rays, &hits, lane);
                 }
             }
             for lane in 0..LANES {
@@ -192,13 +180,13 @@ impl<'w> Run<'w> {
         } = &self.apparatus.machine;
         let (mut mean, mut factor) = ([0.0; LANES], [1.0; LANES]);
         for sight in &self.apparatus.sights {
-            let (rays, hits) = self.look(sight);
+            let (rays, hits) = self.apparatus.cast(self.pose, sight);
             for (mean, d) in mean.iter_mut().zip(hits.distance_m) {
                 *mean += sight.weight * d.min(*range_m);
             }
             if self.apparatus.weighs_rays {
                 for lane in (0..LANES).filter(|&lane| hits.distance_m[lane] <= *range_m) {
-                    factor[lane] += sight.weight * (self.ray_factor(&rays, &hits, lane) - 1.0);
+                    factor[lane] += sight.weight * (self.apparatus.ray_factor(&rays, &hits, lane) - 1.0);
                 }
             }
         }
@@ -208,40 +196,10 @@ impl<'w> Run<'w> {
         std::array::from_fn(|i| if seen(mean[i]) { factor[i] * values[i] } else { 0.0 })
     }
 
-    /// The rays of a sight and what they hit.
-    #[inline]
-    fn look(&self, sight: &Sight) -> (Rays, Hits) {
-        let rays = sight.rays.placed(self.pose);
-        let hits =
-            self.apparatus
-                .geometry
-                .caster
-                .cast(&self.apparatus.geometry.walls, self.pose.position, &rays);
-        (rays, hits)
-    }
-
-    /// What the effects make of one ray's response.
-    fn ray_factor(&self, rays: &Rays, hits: &Hits, lane: usize) -> f64 {
-        let (walls, segment) = (&self.apparatus.geometry.walls, hits.segment[lane] as usize);
-        let direction = rays.direction(lane);
-        let place = walls.place(segment, rays.origin(lane) + direction * hits.distance_m[lane]);
-        let hit = Hit {
-            sensor: lane,
-            distance_m: hits.distance_m[lane],
-            cos_incidence: walls.normal(segment).dot(direction).abs().min(1.0),
-            site: self.world.scene.site(place),
-        };
-        self.apparatus
-            .effects
-            .iter()
-            .map(|active| active.effect.ray_factor(&active.values, &hit))
-            .product()
-    }
-
     /// The physics steps of one control step.
     #[inline]
     fn act(&mut self, mut now: Moment) {
-        let rules = self.world.rules();
+        let rules = self.apparatus.world.rules();
         let step_s = rules.control_step_s / f64::from(rules.physics_steps);
         let start_s = now.time_s;
         now.step_s = step_s;
@@ -308,14 +266,14 @@ impl<'w> Run<'w> {
     /// Starts the random streams afresh when the true position passes the next gate.
     #[inline]
     fn pass_gate(&mut self) {
-        let gates = &self.world.circuit().gates;
+        let gates = &self.apparatus.world.circuit().gates;
         let gate = &gates[self.next_gate];
         let way = self.pose.position - gate.center;
-        if way.dot(self.world.forward(self.next_gate)) < 0.0 || way.length_squared() > 0.04 {
+        if way.dot(self.apparatus.world.forward(self.next_gate)) < 0.0 || way.length_squared() > 0.04 {
             return;
         }
         let count = gates.len();
-        self.next_gate = match self.world.rules().way {
+        self.next_gate = match self.apparatus.world.rules().way {
             Way::Forward => (self.next_gate + 1) % count,
             Way::Backward => (self.next_gate + count - 1) % count,
         };

@@ -89,7 +89,7 @@ impl Atlas {
                 |e: &Explanation| e.score > best.score - behind && e.effects.len() == best.effects.len();
             found.iter().take_while(|f| alike(&f.explanation)).count()
         });
-        let mut left_out = vec![Vec::new(); runs.len()];
+        let (mut left_out, mut cause) = (vec![Vec::new(); runs.len()], None);
         if verdict != Verdict::Unexplained
             && let Some(answer) = found.first_mut()
         {
@@ -101,9 +101,8 @@ impl Atlas {
             } else {
                 vec![explanation.settings(); runs.len()]
             };
+            cause = Cause::of(&explanation.effects[0].setting);
         }
-        let answer = found.first().filter(|_| verdict != Verdict::Unexplained);
-        let cause = answer.and_then(|answer| Cause::of(&answer.explanation.effects[0].setting));
         Ok(LapDiagnosis {
             residual: numbers,
             answer: Answer {

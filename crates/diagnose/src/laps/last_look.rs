@@ -66,7 +66,7 @@ impl Atlas {
             let holds = certain && are_within_steps(&moves, &freedoms);
             look = LastLook {
                 errors: freedoms.iter().copied().zip(errors).collect(),
-                about: std::mem::replace(&mut look.found, found.clone()),
+                about: look.found,
                 found,
                 freedoms,
                 local: Some(local),

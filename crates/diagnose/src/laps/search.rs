@@ -287,11 +287,8 @@ impl Search<'_> {
             alive.retain(|d| d.score >= bar - behind.max(share * bar));
             alive = self.without_repeats(alive);
             if fits {
-                let mut place = 0;
-                alive.retain(|descent| {
-                    place += 1;
-                    place <= FEW || may_catch_up(descent, best)
-                });
+                let others = alive.split_off(FEW.min(alive.len()));
+                alive.extend(others.into_iter().filter(|other| may_catch_up(other, best)));
             }
             if hopeless && round == Round::Full {
                 break;

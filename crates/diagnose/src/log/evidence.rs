@@ -169,14 +169,15 @@ impl<'a> Evidence<'a> {
 
     /// All stretches filtered with these effects added; `None` where the filter lost the robot.
     pub(crate) fn traces(&self, settings: &[Setting]) -> Option<Vec<(World<'a>, Trace)>> {
-        self.stretches
-            .par_iter()
-            .map(|stretch| {
-                let world = self.world(settings, stretch.run).ok()?;
-                let trace = filter(&world, stretch.rows, Some(&stretch.used), self.step_counts)?;
-                Some((world, trace))
-            })
+        (self.stretches.par_iter())
+            .map(|stretch| self.trace(stretch, settings))
             .collect()
+    }
+
+    fn trace(&self, stretch: &Stretch<'_>, settings: &[Setting]) -> Option<(World<'a>, Trace)> {
+        let world = self.world(settings, stretch.run).ok()?;
+        let trace = filter(&world, stretch.rows, Some(&stretch.used), self.step_counts)?;
+        Some((world, trace))
     }
 
     /// The log-likelihood with these effects and its derivatives with the knobs.
@@ -185,8 +186,7 @@ impl<'a> Evidence<'a> {
             .stretches
             .par_iter()
             .map(|stretch| {
-                let world = self.world(settings, stretch.run).ok()?;
-                let trace = filter(&world, stretch.rows, Some(&stretch.used), self.step_counts)?;
+                let (world, trace) = self.trace(stretch, settings)?;
                 let columns = self.derivatives(&world, &trace, settings, knobs)?;
                 Some((trace.log_likelihood, normal_of(&trace, &columns)))
             })
