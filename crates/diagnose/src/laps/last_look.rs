@@ -54,10 +54,10 @@ impl Atlas {
                 break;
             };
             local.columns = local.columns.into_iter().map(Column::without_noise).collect();
-            let target = white(&local.scatter, &self.layout, data, &local.center);
+            let target = white(&local.scatter, &self.layout, data, &local.center.expectation);
             let (moves, covariance) = nearest(&local.columns, &target, &freedoms);
             let found = self.quantised(self.with_moves(&look.found, &freedoms, &moves));
-            let errors = errors_of(&covariance, local.doubt);
+            let errors = errors_of(&covariance, local.center.doubt);
             let certain = (errors.iter().zip(&freedoms))
                 .zip(&widest)
                 .all(|((error, freedom), widest)| {
@@ -112,11 +112,11 @@ impl Atlas {
         }
         data.0[recording]
             .means
-            .insert(place, local.center.0[recording].means[place].clone());
+            .insert(place, local.center.expectation.0[recording].means[place].clone());
         if alone {
             data.0[recording].means.truncate(1);
         }
-        let target = white(&local.scatter, &self.layout, &data, &local.center);
+        let target = white(&local.scatter, &self.layout, &data, &local.center.expectation);
         let mut own = vec![self.layout.run(run)];
         if alone {
             own.extend([self.layout.trend(recording), self.layout.second(recording)]);

@@ -21,6 +21,8 @@ pub(super) struct Fit {
     pub(super) residual: White,
     /// Log-likelihood gained over the declared model.
     pub(super) gain: f64,
+    /// What the simulation's own error is expected to take of it.
+    pub(super) lost_to_doubt: f64,
     /// Standard deviation of the gain for the simulation's own error.
     pub(super) gain_error: f64,
 }
@@ -59,6 +61,7 @@ impl Atlas {
         }
         Fit {
             gain: 0.5 * (before - residual.norm_squared() - wider),
+            lost_to_doubt: 0.5 * widened,
             gain_error: variance.sqrt(),
             residual,
         }

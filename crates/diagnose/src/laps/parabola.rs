@@ -7,7 +7,6 @@ use super::atlas::{Atlas, Simulate, White, white};
 use super::expectation::{Expectation, Scatter};
 use super::hypothesis::{Freedom, Hypothesis};
 use super::layout::Layout;
-use super::likelihood::Doubt;
 use super::simulated::Evaluated;
 
 impl Atlas {
@@ -73,8 +72,7 @@ impl Atlas {
             column.curvature_doubt = (a.curvature - b.curvature) * (0.5 * of_all);
         }
         Some(Local {
-            center: center.expectation,
-            doubt: center.doubt,
+            center,
             scatter,
             columns,
         })
@@ -112,8 +110,7 @@ fn of_run(action: &White, run: usize, layout: &Layout) -> White {
 /// A hypothesis and its neighbourhood.
 #[derive(Debug, Clone)]
 pub(super) struct Local {
-    pub(super) center: Expectation,
-    pub(super) doubt: Doubt,
+    pub(super) center: Evaluated,
     pub(super) scatter: Vec<Scatter>,
     pub(super) columns: Vec<Column>,
 }
@@ -126,6 +123,15 @@ pub(super) struct Column {
     /// How the slope is off for the simulation's own error, and how the curvature is: one draw of each.
     pub(super) doubt: White,
     curvature_doubt: White,
+}
+
+impl Local {
+    /// Whether noise is a fair share of what its points told of some number.
+    pub(super) fn is_noisy(&self) -> bool {
+        const FAIR: f64 = 0.05;
+        let noisy = |column: &Column| column.doubt.norm_squared() > FAIR * column.slope.norm_squared();
+        self.columns.iter().any(noisy)
+    }
 }
 
 impl Column {

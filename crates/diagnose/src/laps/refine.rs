@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::atlas::{Atlas, Simulate, white};
 use super::expectation::Expectation;
-use super::hypothesis::{Freedom, Hypothesis};
+use super::hypothesis::{Freedom, Hypothesis, Part};
 use super::likelihood::{Doubt, Fit};
 use super::parabola::{Column, Local, left_of, nearest};
 use super::screen::price;
@@ -19,8 +19,8 @@ pub(super) enum Round {
     Rough,
     /// The hypothesis alone; what its numbers do is taken from the rough round.
     Again,
-    /// The hypothesis and both sides, with as many data sets as sizes and their errors need; once its numbers move within
-    /// their steps, the hypothesis alone.
+    /// The hypothesis alone, as often as at the end, once its numbers move within the steps of a look that told what they do;
+    /// else both sides too, with as many data sets as sizes and their errors need.
     Full,
 }
 
@@ -37,6 +37,9 @@ impl Round {
 /// Data sets simulated of every hypothesis that comes to the end, and of the best and others that explain nearly as much.
 const END_SETS: u64 = 16;
 pub(super) const CLOSE_SETS: u64 = 64;
+
+/// Errors by which numbers may still be off where they are left as they are.
+const AT_REST: f64 = 0.25;
 
 /// A hypothesis at its most likely sizes.
 #[derive(Debug, Clone)]
@@ -73,10 +76,10 @@ pub(super) struct Descent {
     looks: u32,
     /// Whether the moves stayed within the steps of the last look.
     holds: bool,
-    /// Whether that was one of a full round.
-    full: bool,
     /// Whether there is nowhere left to descend to.
     found: bool,
+    /// The hypothesis simulated as often as at the end, if it was.
+    end: Option<Evaluated>,
 }
 
 impl Descent {
@@ -92,8 +95,8 @@ impl Descent {
             near: None,
             looks: 0,
             holds: false,
-            full: false,
             found: freedoms.is_empty(),
+            end: None,
             freedoms,
         }
     }
@@ -129,9 +132,9 @@ impl Atlas {
             round => round,
         };
         match (round, &descent.near) {
-            (Round::Again, Some(_)) => self.look_again(simulate, data, descent),
-            (Round::Full, Some(_)) if descent.holds && descent.full && !has_place => {
-                self.look_again(simulate, data, descent)
+            (Round::Again, Some(_)) => self.look_again(simulate, data, descent, round),
+            (Round::Full, Some((local, _))) if descent.holds && !has_place && !local.is_noisy() => {
+                self.look_again(simulate, data, descent, round)
             }
             _ => self.look_around(simulate, data, descent, round),
         }
@@ -156,31 +159,40 @@ impl Atlas {
             &freedoms,
             self.sets_around(&freedoms, round),
         )?;
-        let target = white(&local.scatter, &self.layout, data, &local.center);
+        let Evaluated {
+            expectation, doubt, ..
+        } = &local.center;
+        let target = white(&local.scatter, &self.layout, data, expectation);
         let (moves, covariance) = nearest(&local.columns, &target, &freedoms);
         let left = left_of(&local.columns, &target, &moves);
-        let fit = self.fit_of(data, left, &local.scatter, local.doubt);
+        let hoped = 0.5 * (target.norm_squared() - left.norm_squared());
+        let fit = self.fit_of(data, left, &local.scatter, *doubt);
         let hypothesis = self.with_moves(&hypothesis, &freedoms, &moves);
         let full = round == Round::Full;
         let found = full && is_settled(&moves, &covariance, &freedoms);
         let holds = are_within_steps(&moves, &freedoms);
         let remainder = full.then(|| FourNumbers::new(&fit.residual, &self.layout));
-        let errors = errors_of(&covariance, local.doubt);
+        let errors = errors_of(&covariance, *doubt);
         for (i, freedom) in freedoms.iter_mut().enumerate() {
             // The parabola should hold where the answer may lie, and be wide enough for the noise of its points not to
             // pass for information.
             let reach = (10.0 * errors[i]).max(moves[i].abs());
             freedom.step = reach.clamp(0.2 * freedom.step, freedom.step);
         }
-        let score = hypothesis.worth(fit.gain) - self.price_of(&hypothesis);
+        let gain = if full {
+            self.certain_gain(data, &local.center)? + hoped
+        } else {
+            fit.gain
+        };
+        let score = hypothesis.worth(gain) - self.price_of(&hypothesis);
         Some(Descent {
             score,
             progress: score - descent.score,
             near: Some((local, moves)),
             looks: looks + 1,
             holds,
-            full,
             found,
+            end: None,
             remainder,
             hypothesis,
             freedoms,
@@ -188,18 +200,23 @@ impl Atlas {
         })
     }
 
-    fn look_again(&self, simulate: &Simulate<'_>, data: &Expectation, descent: Descent) -> Option<Descent> {
+    fn look_again(
+        &self,
+        simulate: &Simulate<'_>,
+        data: &Expectation,
+        descent: Descent,
+        round: Round,
+    ) -> Option<Descent> {
         let Descent {
             freedoms,
-            mut errors,
             near,
             looks,
             holds,
-            full,
             ..
         } = descent;
         let (local, moved) = near?;
-        let sets = self.enough(Round::Again.sets(1), 1);
+        let full = round == Round::Full;
+        let sets = self.enough(if full { END_SETS } else { round.sets(1) }, 1);
         let center = self.evaluate(simulate, &descent.hypothesis, sets)?;
         let columns: Vec<Column> = (local.columns.iter().zip(moved.iter()))
             .map(|(column, moved)| column.from(*moved))
@@ -207,32 +224,52 @@ impl Atlas {
         let target = white(&local.scatter, &self.layout, data, &center.expectation);
         let (moves, covariance) = nearest(&columns, &target, &freedoms);
         let left = left_of(&columns, &target, &moves);
-        let hoped = target.norm_squared() - left.norm_squared();
+        let hoped = 0.5 * (target.norm_squared() - left.norm_squared());
         let fit = self.fit_of(data, left, &local.scatter, center.doubt);
-        let hypothesis = self.with_moves(&descent.hypothesis, &freedoms, &moves);
-        let score = if full {
-            errors = errors_of(&covariance, center.doubt);
-            // Other draws would not compare with those whose numbers came to rest before.
-            descent.score
-        } else {
-            let gain = self.fit(data, &center)?.gain + 0.5 * hoped;
-            hypothesis.worth(gain) - self.price_of(&hypothesis)
-        };
+        let errors = errors_of(&covariance, center.doubt);
+        let gain = self.certain_gain(data, &center)? + hoped;
         let found = full && is_settled(&moves, &covariance, &freedoms);
+        let remainder = Some(FourNumbers::new(&fit.residual, &self.layout));
+        if found
+            && moves
+                .iter()
+                .zip(&errors)
+                .all(|(moved, error)| moved.abs() < AT_REST * error)
+        {
+            return Some(Descent {
+                score: descent.hypothesis.worth(gain) - self.price_of(&descent.hypothesis),
+                remainder,
+                near: Some((local, moved)),
+                freedoms,
+                errors,
+                found,
+                    end: Some(center),
+                ..descent
+            });
+        }
+        let hypothesis = self.with_moves(&descent.hypothesis, &freedoms, &moves);
+        let score = hypothesis.worth(gain) - self.price_of(&hypothesis);
         let moved = moved + moves;
         Some(Descent {
             score,
             progress: score - descent.score,
-            remainder: Some(FourNumbers::new(&fit.residual, &self.layout)),
+            remainder,
             holds: holds && are_within_steps(&moved, &freedoms),
             near: Some((local, moved)),
             looks,
-            full,
             found,
+            end: None,
             hypothesis,
             freedoms,
             errors,
         })
+    }
+
+    /// The log-likelihood gained with what the simulation's own error costs of it added back: how often hypotheses were
+    /// simulated does not matter then.
+    fn certain_gain(&self, data: &Expectation, simulated: &Evaluated) -> Option<f64> {
+        let fit = self.fit(data, simulated)?;
+        Some(fit.gain + fit.lost_to_doubt)
     }
 
     pub(super) fn with_moves(
@@ -267,7 +304,12 @@ impl Atlas {
         {
             return None;
         }
-        let end = self.evaluate(simulate, &hypothesis, self.enough(END_SETS, 1))?;
+        let moved = |(a, b): (&Part, &Part)| a.values != b.values;
+        let as_found = !(hypothesis.parts.iter().zip(&found.hypothesis.parts)).any(moved);
+        let end = match &found.end {
+            Some(end) if as_found => end.clone(),
+            _ => self.evaluate(simulate, &hypothesis, self.enough(END_SETS, 1))?,
+        };
         let fit = self.fit(data, &end)?;
         Some(self.settled(hypothesis, found.errors(), fit, end))
     }

@@ -15,7 +15,7 @@ use super::summary::Summary;
 pub(super) const FINAL_SETS: u64 = 32;
 
 /// A hypothesis simulated.
-#[derive(Clone)]
+#[derive(Debug, Clone)]
 pub(super) struct Evaluated {
     pub(super) expectation: Expectation,
     pub(super) doubt: Doubt,
