@@ -3,6 +3,7 @@
 use sim::{Setting, UNLISTED};
 
 use super::atlas::{Atlas, Simulate};
+use super::classes::most_probable_first;
 use super::screen::Screened;
 use super::search::{Found, Search, candidates, sort};
 use super::tests_of_fit::{FourNumbers, SIGNIFICANT_P};
@@ -80,15 +81,14 @@ impl Atlas {
             residual: &residual,
         };
         let mut found = explain(&search, &screened);
-        let best = found.first().map(|best| &best.explanation);
-        let verdict = best.map_or(Verdict::Unexplained, verdict_of);
-        let indistinguishable = best.map_or(0, |best| {
-            // Candidates share their draws, so that much of the error is common to them.
-            let behind = ALTERNATIVE + found[0].gain_error;
-            let alike =
-                |e: &Explanation| e.score > best.score - behind && e.effects.len() == best.effects.len();
-            found.iter().take_while(|f| alike(&f.explanation)).count()
-        });
+        let indistinguishable = alike(&found);
+        let verdict = found.first().map(|best| verdict_of(&best.explanation));
+        let verdict = verdict.unwrap_or(Verdict::Unexplained);
+        if verdict == Verdict::Explained {
+            let equal = found[..indistinguishable].iter();
+            let equal = equal.take_while(|found| suffices(&found.explanation)).count();
+            most_probable_first(&mut found[..equal]);
+        }
         let (mut left_out, mut cause) = (vec![Vec::new(); runs.len()], None);
         if verdict != Verdict::Unexplained
             && let Some(answer) = found.first_mut()
@@ -155,6 +155,18 @@ fn explain(search: &Search<'_>, screened: &[Screened]) -> Vec<Found> {
         found = unless_named(found, search.unnamed());
     }
     found
+}
+
+/// How many of the first explanations the data do not tell from the best.
+fn alike(found: &[Found]) -> usize {
+    let Some(first) = found.first() else {
+        return 0;
+    };
+    let best = &first.explanation;
+    // Candidates share their draws, so that much of the error is common to them.
+    let behind = ALTERNATIVE + first.gain_error;
+    let alike = |e: &Explanation| e.score > best.score - behind && e.effects.len() == best.effects.len();
+    found.iter().take_while(|f| alike(&f.explanation)).count()
 }
 
 fn first_is(found: &[Found], holds: impl Fn(&Explanation) -> bool) -> bool {

@@ -161,12 +161,15 @@ impl Scatter {
 
     /// The scatter of the laps of these recordings where they are too few to know it well: drawn towards one that has the
     /// principal axes of another, as far as chance explains the difference (Ledoit and Wolf 2004); the scatter of the
-    /// second-order numbers is the other's.
+    /// second-order numbers is the other's. Recordings that were simulated with the same draws and hardly differ are
+    /// `copies` that count as one.
     pub(super) fn near<'a>(
         recordings: impl Iterator<Item = &'a Recording> + Clone,
+        copies: usize,
         other: &Self,
     ) -> Option<Self> {
         let (own, freedom) = pooled(recordings, other.open.nrows());
+        let freedom = freedom / copies as f64;
         let size = own.nrows();
         let along = |covariance: &DMatrix<f64>| other.axes.tr_mul(covariance) * &other.axes;
         let others = along(&other.of_lap()).diagonal();
@@ -391,7 +394,7 @@ mod tests {
             const TIMES: usize = 40;
             for _ in 0..TIMES {
                 let few = recording(&truth.l(), 3 * SIZE, &mut stream);
-                let scatter = Scatter::near(std::iter::once(&few), &other).unwrap();
+                let scatter = Scatter::near(std::iter::repeat_n(&few, 7), 7, &other).unwrap();
                 let fresh = drawn(&truth.l(), &mut stream);
                 squares += scatter.whiten(&fresh).norm_squared() / TIMES as f64;
                 off += (scatter.log_det - log_det) / TIMES as f64;

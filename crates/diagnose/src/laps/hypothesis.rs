@@ -132,6 +132,35 @@ impl Part {
         }
     }
 
+    /// The same with a size that goes over the runs or in time, from the same size; `None` if it has a pattern or cannot.
+    fn over(&self, shape: Shape, atlas: &Atlas) -> Option<Self> {
+        let (can, lists) = match shape {
+            Shape::Constant => (false, 1),
+            Shape::ByRun => (atlas.layout.runs() > 1, atlas.layout.runs()),
+            Shape::ByTime => (!atlas.probes[self.probe].drifts(), 1),
+        };
+        (can && self.shape == Shape::Constant && self.held.is_none()).then(|| Self {
+            shape,
+            values: vec![self.values[0].clone(); lists],
+            ..self.clone()
+        })
+    }
+
+    /// The same at its mean size.
+    fn plain(&self, atlas: &Atlas) -> Self {
+        let size = atlas.probes[self.probe].size_index();
+        let count = self.values.len() as f64;
+        let mean = self.values.iter().map(|values| values[size]).sum::<f64>() / count;
+        let mut values = self.values[0].clone();
+        values[size] = mean + self.per_s * middle_s(atlas);
+        Self {
+            shape: Shape::Constant,
+            values: vec![values],
+            per_s: 0.0,
+            ..self.clone()
+        }
+    }
+
     /// Whether its size came to the neutral one in every run: sizes in steps do.
     pub(super) fn is_nothing(&self, probe: &Probe) -> bool {
         let size = probe.size_index();
@@ -267,38 +296,34 @@ impl Hypothesis {
         let [part] = self.parts.as_slice() else {
             return None;
         };
-        let (can, lists) = match shape {
-            Shape::Constant => (false, 1),
-            Shape::ByRun => (atlas.layout.runs() > 1, atlas.layout.runs()),
-            Shape::ByTime => (!atlas.probes[part.probe].drifts(), 1),
+        part.over(shape, atlas).map(Self::of)
+    }
+
+    /// The same with the pattern of its only effect that has one given to each of the others instead.
+    pub(super) fn with_pattern_elsewhere(&self, atlas: &Atlas) -> Vec<Self> {
+        let patterned = |part: &&Part| part.shape != Shape::Constant;
+        let (Some(plain), Some(shape)) = (
+            self.without_patterns(atlas),
+            self.parts.iter().find(patterned).map(|part| part.shape),
+        ) else {
+            return Vec::new();
         };
-        (can && part.shape == Shape::Constant && part.held.is_none()).then(|| Self {
-            parts: vec![Part {
-                shape,
-                values: vec![part.values[0].clone(); lists],
-                ..part.clone()
-            }],
-        })
+        if self.parts.iter().filter(patterned).count() > 1 {
+            return Vec::new();
+        }
+        let given = |(i, part): (usize, &Part)| {
+            let mut parts = plain.parts.clone();
+            parts[i] = part.over(shape, atlas)?;
+            Some(Self { parts })
+        };
+        self.parts.iter().enumerate().filter_map(given).collect()
     }
 
     /// The same with the mean size of every effect whose size goes over the runs or in time; `None` if none does.
     pub(super) fn without_patterns(&self, atlas: &Atlas) -> Option<Self> {
-        let plain = |part: &Part| {
-            let size = atlas.probes[part.probe].size_index();
-            let count = part.values.len() as f64;
-            let mean = part.values.iter().map(|values| values[size]).sum::<f64>() / count;
-            let mut values = part.values[0].clone();
-            values[size] = mean + part.per_s * middle_s(atlas);
-            Part {
-                shape: Shape::Constant,
-                values: vec![values],
-                per_s: 0.0,
-                ..part.clone()
-            }
-        };
         let patterned = self.parts.iter().any(|part| part.shape != Shape::Constant);
         patterned.then(|| Self {
-            parts: self.parts.iter().map(plain).collect(),
+            parts: self.parts.iter().map(|part| part.plain(atlas)).collect(),
         })
     }
 

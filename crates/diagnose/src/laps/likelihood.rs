@@ -30,7 +30,7 @@ pub(super) struct Fit {
 impl Atlas {
     /// How well a simulated hypothesis explains the data; `None` if it was simulated too seldom to know its scatter.
     pub(super) fn fit(&self, data: &Expectation, simulated: &Evaluated) -> Option<Fit> {
-        let scatter = self.scatter_of(simulated.summaries.iter())?;
+        let scatter = self.scatter_of(simulated.summaries.iter(), 1)?;
         Some(self.fit_in(data, simulated, &scatter))
     }
 
@@ -109,7 +109,8 @@ impl Atlas {
     /// The scatter of each of several simulated hypotheses that explain data about as well: the same for all but for what
     /// chance does not explain. `None` if they were simulated too seldom.
     pub(super) fn scatters_of(&self, rivals: &[Evaluated]) -> Option<Vec<Vec<Scatter>>> {
-        let common = self.scatter_of(rivals.iter().flat_map(|rival| &rival.summaries))?;
+        let all = rivals.iter().flat_map(|rival| &rival.summaries);
+        let common = self.scatter_of(all, rivals.len())?;
         let of = |rival: &Evaluated| {
             let own = |(g, common): (usize, &Scatter)| {
                 common.unless_apart(rival.summaries.iter().map(move |summary| &summary.0[g]))
@@ -119,13 +120,19 @@ impl Atlas {
         rivals.iter().map(of).collect()
     }
 
-    /// The scatter of simulated data sets, recording by recording.
+    /// The scatter of simulated data sets, recording by recording; of each there are so many copies, simulated with the same
+    /// draws.
     pub(super) fn scatter_of<'a>(
         &self,
         summaries: impl Iterator<Item = &'a Summary> + Clone,
+        copies: usize,
     ) -> Option<Vec<Scatter>> {
         let of = |(g, declared): (usize, &Scatter)| {
-            Scatter::near(summaries.clone().map(move |summary| &summary.0[g]), declared)
+            Scatter::near(
+                summaries.clone().map(move |summary| &summary.0[g]),
+                copies,
+                declared,
+            )
         };
         self.scatter.iter().enumerate().map(of).collect()
     }

@@ -42,7 +42,7 @@ impl Atlas {
         let all = sides
             .iter()
             .flat_map(|(_, a, b)| a.1.summaries.iter().chain(&b.1.summaries));
-        let scatter = self.scatter_of(center.summaries.iter().chain(all))?;
+        let scatter = self.scatter_of(center.summaries.iter().chain(all), 1 + 2 * sides.len())?;
         let columns_of = |expected: &dyn Fn(&Evaluated) -> Expectation| -> Vec<Column> {
             let from = expected(&center);
             let action = |e: &Evaluated| white(&scatter, &self.layout, &expected(e), &from);

@@ -10,7 +10,7 @@ use super::likelihood::{Doubt, Fit};
 use super::parabola::{Column, Local, left_of, nearest};
 use super::screen::price;
 use super::simulated::Evaluated;
-use super::tests_of_fit::FourNumbers;
+use super::tests_of_fit::{FourNumbers, HOPELESS_P};
 
 /// What is simulated in a round of a descent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -19,17 +19,26 @@ pub(super) enum Round {
     Rough,
     /// The hypothesis alone; what its numbers do is taken from the rough round.
     Again,
-    /// The hypothesis alone, as often as at the end, once its numbers move within the steps of a look that told what they do;
-    /// else both sides too, with as many data sets as sizes and their errors need.
+    /// The hypothesis alone, as often as at the end, where an earlier look told what its numbers do; else both sides too, with
+    /// as many data sets as sizes and their errors need.
     Full,
 }
 
 impl Round {
     /// Data sets at each of so many points: the fewer the more points there are.
-    fn sets(self, points: u64) -> u64 {
+    fn sets_around(self, points: u64) -> u64 {
         match self {
-            Self::Rough => (16 / points).clamp(3, 4),
-            Self::Again | Self::Full => (45 / points).clamp(6, 10),
+            Self::Rough | Self::Again => (16 / points).clamp(3, 4),
+            Self::Full => (45 / points).clamp(6, 10),
+        }
+    }
+
+    /// Data sets by which hypotheses are compared after the round.
+    fn sets(self) -> u64 {
+        match self {
+            Self::Rough => 4,
+            Self::Again => 10,
+            Self::Full => END_SETS,
         }
     }
 }
@@ -101,6 +110,18 @@ impl Descent {
         }
     }
 
+    /// Whether nothing short of another effect would help, as far as a round saw.
+    pub(super) fn leaves_far_too_much(&self) -> bool {
+        (self.remainder).is_some_and(|left| left.omnibus_p() < HOPELESS_P)
+    }
+
+    /// Whether an earlier look still tells what its numbers do: they moved within its steps, not along noise, and little is
+    /// left, which slopes that are a little off could be taken for.
+    fn knows_its_slopes(&self) -> bool {
+        let clear = (self.near.as_ref()).is_some_and(|(local, _)| !local.is_noisy());
+        self.holds && clear && !self.leaves_far_too_much()
+    }
+
     fn errors(&self) -> Vec<(Freedom, f64)> {
         self.freedoms
             .iter()
@@ -126,17 +147,16 @@ impl Atlas {
             return Some(descent);
         }
         let has_place = descent.hypothesis.has_place(self);
-        let round = match round {
+        let again = match round {
+            Round::Rough => false,
             // A place is not found on one parabola, nor a far one on two.
-            Round::Again if has_place && !(descent.holds && descent.looks > 1) => Round::Rough,
-            round => round,
+            Round::Again => !has_place || descent.holds && descent.looks > 1,
+            Round::Full => !has_place && descent.knows_its_slopes(),
         };
-        match (round, &descent.near) {
-            (Round::Again, Some(_)) => self.look_again(simulate, data, descent, round),
-            (Round::Full, Some((local, _))) if descent.holds && !has_place && !local.is_noisy() => {
-                self.look_again(simulate, data, descent, round)
-            }
-            _ => self.look_around(simulate, data, descent, round),
+        if again && descent.near.is_some() {
+            self.look_again(simulate, data, descent, round)
+        } else {
+            self.look_around(simulate, data, descent, round)
         }
     }
 
@@ -153,12 +173,10 @@ impl Atlas {
             looks,
             ..
         } = descent;
-        let local = self.local(
-            simulate,
-            &hypothesis,
-            &freedoms,
-            self.sets_around(&freedoms, round),
-        )?;
+        let full = round == Round::Full;
+        let points = 2 * freedoms.len() as u64 + 1;
+        let sets = self.enough(round.sets_around(points), points);
+        let local = self.local(simulate, &hypothesis, &freedoms, sets)?;
         let Evaluated {
             expectation, doubt, ..
         } = &local.center;
@@ -167,8 +185,14 @@ impl Atlas {
         let left = left_of(&local.columns, &target, &moves);
         let hoped = 0.5 * (target.norm_squared() - left.norm_squared());
         let fit = self.fit_of(data, left, &local.scatter, *doubt);
+        let gain = if round == Round::Rough {
+            fit.gain + fit.lost_to_doubt
+        } else {
+            let sets = self.enough(round.sets(), 1);
+            let center = self.evaluate_more(simulate, &hypothesis, local.center.clone(), sets)?;
+            self.likely_gain(data, &center)? + hoped
+        };
         let hypothesis = self.with_moves(&hypothesis, &freedoms, &moves);
-        let full = round == Round::Full;
         let found = full && is_settled(&moves, &covariance, &freedoms);
         let holds = are_within_steps(&moves, &freedoms);
         let remainder = full.then(|| FourNumbers::new(&fit.residual, &self.layout));
@@ -179,11 +203,6 @@ impl Atlas {
             let reach = (10.0 * errors[i]).max(moves[i].abs());
             freedom.step = reach.clamp(0.2 * freedom.step, freedom.step);
         }
-        let gain = if full {
-            self.certain_gain(data, &local.center)? + hoped
-        } else {
-            fit.gain
-        };
         let score = hypothesis.worth(gain) - self.price_of(&hypothesis);
         Some(Descent {
             score,
@@ -216,8 +235,7 @@ impl Atlas {
         } = descent;
         let (local, moved) = near?;
         let full = round == Round::Full;
-        let sets = self.enough(if full { END_SETS } else { round.sets(1) }, 1);
-        let center = self.evaluate(simulate, &descent.hypothesis, sets)?;
+        let center = self.evaluate(simulate, &descent.hypothesis, self.enough(round.sets(), 1))?;
         let columns: Vec<Column> = (local.columns.iter().zip(moved.iter()))
             .map(|(column, moved)| column.from(*moved))
             .collect();
@@ -227,7 +245,7 @@ impl Atlas {
         let hoped = 0.5 * (target.norm_squared() - left.norm_squared());
         let fit = self.fit_of(data, left, &local.scatter, center.doubt);
         let errors = errors_of(&covariance, center.doubt);
-        let gain = self.certain_gain(data, &center)? + hoped;
+        let gain = self.likely_gain(data, &center)? + hoped;
         let found = full && is_settled(&moves, &covariance, &freedoms);
         let remainder = Some(FourNumbers::new(&fit.residual, &self.layout));
         if found
@@ -243,7 +261,7 @@ impl Atlas {
                 freedoms,
                 errors,
                 found,
-                    end: Some(center),
+                end: Some(center),
                 ..descent
             });
         }
@@ -265,9 +283,9 @@ impl Atlas {
         })
     }
 
-    /// The log-likelihood gained with what the simulation's own error costs of it added back: how often hypotheses were
-    /// simulated does not matter then.
-    fn certain_gain(&self, data: &Expectation, simulated: &Evaluated) -> Option<f64> {
+    /// The log-likelihood gained by a simulated hypothesis, with what the simulation's own error is expected to cost added
+    /// back: rounds simulate more or less often.
+    fn likely_gain(&self, data: &Expectation, simulated: &Evaluated) -> Option<f64> {
         let fit = self.fit(data, simulated)?;
         Some(fit.gain + fit.lost_to_doubt)
     }
@@ -280,12 +298,6 @@ impl Atlas {
     ) -> Hypothesis {
         let by: Vec<(Freedom, f64)> = freedoms.iter().copied().zip(moves.iter().copied()).collect();
         hypothesis.moved(self, &by)
-    }
-
-    /// Data sets at each point of a round that looks to both sides of these numbers.
-    fn sets_around(&self, freedoms: &[Freedom], round: Round) -> u64 {
-        let points = 2 * freedoms.len() as u64 + 1;
-        self.enough(round.sets(points), points)
     }
 
     /// A hypothesis at its most likely sizes, simulated often enough to judge it; `None` where the robot crashes, and where

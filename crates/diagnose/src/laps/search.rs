@@ -10,7 +10,7 @@ use super::hypothesis::{Freedom, Hypothesis, Part, Shape};
 use super::refine::{CLOSE_SETS, Descent, Round, Settled};
 use super::screen::Screened;
 use super::simulated::FINAL_SETS;
-use super::tests_of_fit::{FourNumbers, SIGNIFICANT_P};
+use super::tests_of_fit::{FourNumbers, HOPELESS_P, SIGNIFICANT_P};
 use crate::{Candidate, Explanation};
 
 /// An explanation and what simulates it.
@@ -56,9 +56,6 @@ const ROUNDS_OF_SEVERAL: [(Round, f64, f64); 6] = [
 
 /// The same for hypotheses of many numbers that are linear in what they do.
 const ROUNDS_OF_GROUPS: [(Round, f64, f64); 2] = [(Round::Rough, 30.0, 0.05), (Round::Full, 20.0, 0.015)];
-
-/// Probability of what is left below which nothing short of another effect helps.
-const HOPELESS_P: f64 = 1e-12;
 
 impl Search<'_> {
     /// The best single effects, tried to the end, best first.
@@ -153,7 +150,7 @@ impl Search<'_> {
         }
         let mut descents = self.descend_several(&starts, f64::NEG_INFINITY);
         // What leaves far too much lacks a third effect rather than another second one.
-        if let Some(best) = best_of(&descents).filter(|best| !leaves_far_too_much(best)) {
+        if let Some(best) = best_of(&descents).filter(|best| !best.leaves_far_too_much()) {
             let exchanged = self.exchanged(best, &starts);
             descents.extend(self.descend_several(&exchanged, best.score));
         }
@@ -184,13 +181,18 @@ impl Search<'_> {
         self.settle(self.descend_several(&starts, f64::NEG_INFINITY))
     }
 
-    /// Descends from hypotheses of several effects; the best one is tried without its patterns too, which what another
-    /// effect left may have suggested.
+    /// Descends from hypotheses of several effects; the best one is tried without its patterns too, and with its pattern given
+    /// to another of its effects: what another effect left may have suggested it.
     fn descend_several(&self, starts: &[Hypothesis], reached: f64) -> Vec<Descent> {
         let mut descents = self.descend(starts.iter(), &ROUNDS_OF_SEVERAL, reached);
         let best = best_of(&descents);
-        let plain = best.and_then(|best| best.hypothesis.without_patterns(self.atlas));
-        descents.extend(self.descend(plain.iter(), &ROUNDS_OF_SEVERAL, reached));
+        let others: Vec<Hypothesis> = best.map_or_else(Vec::new, |best| {
+            let plain = best.hypothesis.without_patterns(self.atlas).into_iter();
+            plain
+                .chain(best.hypothesis.with_pattern_elsewhere(self.atlas))
+                .collect()
+        });
+        descents.extend(self.descend(others.iter(), &ROUNDS_OF_SEVERAL, reached));
         descents
     }
 
@@ -418,7 +420,7 @@ const SLOW: f64 = 0.1;
 
 /// Whether the best descent leaves far too much and does not get on: more rounds would not make an answer of it.
 fn is_hopeless(descent: &Descent) -> bool {
-    leaves_far_too_much(descent)
+    descent.leaves_far_too_much()
         && (descent.remainder).is_some_and(|left| descent.progress < SLOW * 0.5 * left.excess())
 }
 
@@ -431,10 +433,6 @@ fn may_catch_up(descent: &Descent, best: f64) -> bool {
 
 fn fits(descent: &Descent) -> bool {
     (descent.remainder).is_some_and(|left| left.omnibus_p() >= SIGNIFICANT_P)
-}
-
-fn leaves_far_too_much(descent: &Descent) -> bool {
-    (descent.remainder).is_some_and(|left| left.omnibus_p() < HOPELESS_P)
 }
 
 /// The descent with the best score.

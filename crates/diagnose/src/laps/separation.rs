@@ -40,6 +40,7 @@ pub fn separations(
     let other = Scatter::of_few(declared.iter().map(|summary| &summary.0[0]))?;
     let scatter = [Scatter::near(
         answered.iter().map(|summary| &summary.0[0]),
+        1,
         &other,
     )?];
     let halves = |summaries: &[Summary]| {

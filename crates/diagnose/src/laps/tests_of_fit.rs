@@ -8,6 +8,8 @@ use super::summary::SECOND;
 
 /// Probability of what is left below which it is significant.
 pub(super) const SIGNIFICANT_P: f64 = 0.001;
+/// Probability of what is left below which nothing short of another effect helps.
+pub(super) const HOPELESS_P: f64 = 1e-12;
 
 /// A sum of squares with its probability under the expectation.
 #[derive(Debug, Clone, Copy, PartialEq)]
