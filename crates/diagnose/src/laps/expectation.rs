@@ -160,15 +160,16 @@ impl Scatter {
     }
 
     /// The scatter of the laps of these recordings where they are too few to know it well: drawn towards one that has the
-    /// principal axes of another, as far as chance explains the difference (Ledoit and Wolf 2004); the scatter of the
-    /// second-order numbers is the other's. Recordings that were simulated with the same draws and hardly differ are
-    /// `copies` that count as one.
+    /// principal axes of another, as far as chance explains the difference (Ledoit and Wolf 2004), and so is that of the
+    /// second-order numbers. Recordings that were simulated with the same draws and hardly differ count as one: there are so
+    /// many `copies`, one after the other.
     pub(super) fn near<'a>(
-        recordings: impl Iterator<Item = &'a Recording> + Clone,
+        recordings: impl Iterator<Item = &'a Recording>,
         copies: usize,
         other: &Self,
     ) -> Option<Self> {
-        let (own, freedom) = pooled(recordings, other.open.nrows());
+        let all: Vec<&Recording> = recordings.collect();
+        let (own, freedom) = pooled(all.iter().copied(), other.open.nrows());
         let freedom = freedom / copies as f64;
         let size = own.nrows();
         let along = |covariance: &DMatrix<f64>| other.axes.tr_mul(covariance) * &other.axes;
@@ -185,7 +186,44 @@ impl Scatter {
             .sum();
         let share = share_by_chance(apart, freedom, size);
         let target = &other.axes * DMatrix::from_diagonal(&target) * other.axes.transpose();
-        other.blended(own, freedom, target, share)
+        let second = other.second_near(&all, copies)?;
+        Self {
+            second,
+            ..other.clone()
+        }
+        .blended(own, freedom, target, share)
+    }
+
+    /// The covariance of the second-order numbers of these recordings: this one's with variances that are theirs as far as
+    /// chance does not explain how they differ.
+    fn second_near(&self, recordings: &[&Recording], copies: usize) -> Option<Cholesky<f64, Dyn>> {
+        let sets = recordings.len() / copies;
+        if sets < 3 {
+            return Some(self.second.clone());
+        }
+        let freedom = (sets - 1) as f64;
+        let mut variances = DVector::zeros(SECOND);
+        for copy in recordings.chunks(sets) {
+            let sum: DVector<f64> = copy.iter().map(|recording| &recording.second).sum();
+            let mean = sum / sets as f64;
+            for recording in copy {
+                let deviation = &recording.second - &mean;
+                variances += deviation.component_mul(&deviation) / (freedom * copies as f64);
+            }
+        }
+        let l = self.second.l();
+        let others = &l * l.transpose();
+        let bias = digamma(freedom / 2.0) - (freedom / 2.0).ln();
+        let apart = variances
+            .component_div(&others.diagonal())
+            .map(|ratio| ratio.ln() - bias);
+        let by_chance = SECOND as f64 * variance_of_log(freedom);
+        let own = 1.0 - (by_chance / apart.norm_squared()).min(1.0);
+        // What makes the inverse of a variance estimated with few degrees of freedom unbiased.
+        let wider = own * own * 2.0 / freedom;
+        let factors = apart.map(|apart| (0.5 * (own * apart + wider)).exp());
+        let root = DMatrix::from_diagonal(&factors) * l;
+        (&root * root.transpose()).cholesky()
     }
 
     /// The scatter of the laps of these recordings drawn towards this one, as far as chance explains the difference.
@@ -266,6 +304,11 @@ impl Scatter {
         self.mean.l() * white
     }
 
+    /// log det of the covariance of the second-order numbers.
+    pub(super) fn log_det_second(&self) -> f64 {
+        2.0 * self.second.l_dirty().diagonal().map(f64::ln).sum()
+    }
+
     /// The covariance of one lap.
     pub(super) fn of_lap(&self) -> DMatrix<f64> {
         let l = self.lap.l();
@@ -331,6 +374,12 @@ fn share_by_chance(apart: f64, freedom: f64, size: usize) -> f64 {
 fn inflation(freedom: f64, size: usize) -> Option<f64> {
     let left = freedom - size as f64 - 1.0;
     (left > 0.0).then(|| freedom / left)
+}
+
+/// Variance of the logarithm of a variance estimated with `freedom` degrees of freedom: trigamma of half of it.
+fn variance_of_log(freedom: f64) -> f64 {
+    let inverse = 2.0 / freedom;
+    inverse + inverse.powi(2) / 2.0 + inverse.powi(3) / 6.0
 }
 
 /// Expectation of the log determinant of a covariance estimated with `freedom` degrees of freedom, less the true one (Wishart).
@@ -402,6 +451,44 @@ mod tests {
             // 30 +- 1.2 by chance.
             assert!((squares - 30.0).abs() < 3.6, "{smooth}: {squares}");
             assert!(off.abs() < 1.0, "{smooth}: {off}");
+        }
+    }
+
+    #[test]
+    fn second_order_numbers_have_their_own_variances_as_far_as_chance_allows() {
+        let other = known(4.0);
+        let mut stream = Streams { seed: 7, run: 0 }.open("laps");
+        // As declared, and with every other number three times as wide.
+        for wide in [1.0, 3.0] {
+            let mut draw = || {
+                DVector::from_fn(SECOND, |i, _| {
+                    stream.normal() * if i % 2 == 0 { wide } else { 1.0 }
+                })
+            };
+            let (mut squares, mut off) = (0.0, 0.0);
+            const TIMES: usize = 60;
+            for _ in 0..TIMES {
+                let few: Vec<Recording> = (0..12)
+                    .map(|_| Recording {
+                        runs: Vec::new(),
+                        second: draw(),
+                        scatter: DMatrix::identity(SIZE, SIZE),
+                        freedom: 72,
+                    })
+                    .collect();
+                // The same twice: copies at another size, with another mean.
+                let shifted = few.iter().map(|recording| Recording {
+                    second: recording.second.add_scalar(5.0),
+                    ..recording.clone()
+                });
+                let all: Vec<Recording> = few.iter().cloned().chain(shifted).collect();
+                let scatter = Scatter::near(all.iter(), 2, &other).unwrap();
+                squares += scatter.whiten_second(&draw()).norm_squared() / TIMES as f64;
+                off += (scatter.log_det_second() - 20.0 * wide.ln()) / TIMES as f64;
+            }
+            // 20 +- 0.8 by chance; a variance known from 12 recordings costs a little.
+            assert!((squares - 20.0).abs() < 3.0, "{wide}: {squares}");
+            assert!(off.abs() < 3.0, "{wide}: {off}");
         }
     }
 

@@ -54,7 +54,8 @@ impl Atlas {
         for (g, (own, declared)) in scatter.iter().zip(&self.scatter).enumerate() {
             // Every run's mean lap and the trend are each a draw of one lap's covariance.
             let draws = (self.layout.laps[g].len() + 1) as f64;
-            wider += draws * (own.log_det - declared.log_det);
+            wider +=
+                draws * (own.log_det - declared.log_det) + own.log_det_second() - declared.log_det_second();
             // A quadratic form in an estimated covariance, and its determinant (Wishart).
             let size = self.layout.lap as f64;
             variance += 0.5 * draws * size * (size + draws) / own.freedom;
@@ -109,6 +110,9 @@ impl Atlas {
     /// The scatter of each of several simulated hypotheses that explain data about as well: the same for all but for what
     /// chance does not explain. `None` if they were simulated too seldom.
     pub(super) fn scatters_of(&self, rivals: &[Evaluated]) -> Option<Vec<Vec<Scatter>>> {
+        if rivals.is_empty() {
+            return Some(Vec::new());
+        }
         let all = rivals.iter().flat_map(|rival| &rival.summaries);
         let common = self.scatter_of(all, rivals.len())?;
         let of = |rival: &Evaluated| {

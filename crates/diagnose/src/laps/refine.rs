@@ -33,11 +33,10 @@ impl Round {
         }
     }
 
-    /// Data sets by which hypotheses are compared after the round.
+    /// Data sets by which hypotheses are compared after the round; a rough one has no more than it looked by.
     fn sets(self) -> u64 {
         match self {
-            Self::Rough => 4,
-            Self::Again => 10,
+            Self::Rough | Self::Again => 10,
             Self::Full => END_SETS,
         }
     }
