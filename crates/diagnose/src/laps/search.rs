@@ -352,6 +352,8 @@ impl Search<'_> {
     fn closer(&self, settled: Vec<Settled>) -> Vec<Settled> {
         const CLOSE: f64 = 10.0;
         const CLOSE_SETS_OF_ALL: u64 = 240;
+        /// Laps of a data set of which that many are simulated; of smaller ones more, in the same time.
+        const USUAL_LAPS: u64 = 80;
         let best = (settled.iter().map(|s| s.refined.score)).fold(f64::NEG_INFINITY, f64::max);
         let leaves = |s: &Settled| FourNumbers::new(&s.refined.fit.residual, &self.atlas.layout).omnibus_p();
         let first = settled.iter().find(|s| s.refined.score == best);
@@ -360,10 +362,12 @@ impl Search<'_> {
         }
         let (close, mut others): (Vec<_>, Vec<_>) =
             (settled.into_iter()).partition(|s| s.refined.score > best - CLOSE);
+        let smaller = (USUAL_LAPS / self.atlas.layout.total_laps() as u64).max(1);
         let sets = match close.len() as u64 {
             0 | 1 => FINAL_SETS,
-            rivals => (CLOSE_SETS_OF_ALL / rivals).clamp(FINAL_SETS, CLOSE_SETS),
+            rivals => (smaller * CLOSE_SETS_OF_ALL / rivals).clamp(FINAL_SETS, smaller * CLOSE_SETS),
         };
+        let sets = self.atlas.enough(sets, 1);
         others.extend(self.atlas.settle_rivals(self.simulate, self.data, close, sets));
         others
     }
