@@ -67,6 +67,20 @@ impl Explanation {
     }
 }
 
+/// Log-likelihood within which explanations are alternatives.
+pub(crate) const ALTERNATIVE: f64 = 5.0;
+
+/// How many of the first explanations, best first, data do not tell from the best: of as many effects, and not so far behind.
+pub(crate) fn indistinguishable<'a>(
+    explanations: impl Iterator<Item = &'a Explanation> + Clone,
+    behind: f64,
+) -> usize {
+    explanations.clone().next().map_or(0, |best| {
+        let alike = |e: &&Explanation| e.score > best.score - behind && e.effects.len() == best.effects.len();
+        explanations.take_while(alike).count()
+    })
+}
+
 /// Where a cause sits that no listed effect is.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cause {

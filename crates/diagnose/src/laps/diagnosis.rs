@@ -7,6 +7,7 @@ use super::classes::most_probable_first;
 use super::screen::Screened;
 use super::search::{Found, Search, candidates, sort};
 use super::tests_of_fit::{FourNumbers, SIGNIFICANT_P};
+use crate::answer::{ALTERNATIVE, indistinguishable};
 use crate::{Answer, Cause, Error, Explanation, Verdict};
 
 /// Score of the best probe from which a data set counts as departing from the declared model, whatever the omnibus says.
@@ -23,8 +24,6 @@ const ALL_BUT: f64 = 0.995;
 const MOST: f64 = 0.9;
 /// A cause without a name that explains as much as named ones but for this share comes first.
 const AS_GOOD: f64 = 0.01;
-/// Hypotheses within this log-likelihood of the best are reported as alternatives.
-const ALTERNATIVE: f64 = 5.0;
 /// Log-likelihood that each number of a further effect must gain.
 const WORTH: f64 = 10.0;
 /// The same where what comes before stands without it.
@@ -81,7 +80,9 @@ impl Atlas {
             residual: &residual,
         };
         let mut found = explain(&search, &screened);
-        let indistinguishable = alike(&found);
+        // Candidates share their draws, so that much of the error is common to them.
+        let behind = ALTERNATIVE + found.first().map_or(0.0, |best| best.gain_error);
+        let indistinguishable = indistinguishable(found.iter().map(|found| &found.explanation), behind);
         let verdict = found.first().map(|best| verdict_of(&best.explanation));
         let verdict = verdict.unwrap_or(Verdict::Unexplained);
         if verdict == Verdict::Explained {
@@ -155,18 +156,6 @@ fn explain(search: &Search<'_>, screened: &[Screened]) -> Vec<Found> {
         found = unless_named(found, search.unnamed());
     }
     found
-}
-
-/// How many of the first explanations the data do not tell from the best.
-fn alike(found: &[Found]) -> usize {
-    let Some(first) = found.first() else {
-        return 0;
-    };
-    let best = &first.explanation;
-    // Candidates share their draws, so that much of the error is common to them.
-    let behind = ALTERNATIVE + first.gain_error;
-    let alike = |e: &Explanation| e.score > best.score - behind && e.effects.len() == best.effects.len();
-    found.iter().take_while(|f| alike(&f.explanation)).count()
 }
 
 fn first_is(found: &[Found], holds: impl Fn(&Explanation) -> bool) -> bool {

@@ -139,13 +139,8 @@ impl Scatter {
 
     /// As [`Scatter::of`] from few recordings: the second-order numbers are taken to be independent of each other.
     pub(super) fn of_few<'a>(recordings: impl Iterator<Item = &'a Recording> + Clone) -> Option<Self> {
-        let sets = recordings.clone().count() as f64;
-        let mean = Expected::of(recordings.clone(), true).second;
-        let mut variances = DVector::zeros(SECOND);
-        for recording in recordings.clone() {
-            let deviation = &recording.second - &mean;
-            variances += deviation.component_mul(&deviation) / (sets - 1.0);
-        }
+        let all: Vec<&Recording> = recordings.clone().collect();
+        let variances = variances_of_second(&all, 1);
         Self::of_second(recordings, DMatrix::from_diagonal(&variances))
     }
 
@@ -187,11 +182,7 @@ impl Scatter {
         let share = share_by_chance(apart, freedom, size);
         let target = &other.axes * DMatrix::from_diagonal(&target) * other.axes.transpose();
         let second = other.second_near(&all, copies)?;
-        Self {
-            second,
-            ..other.clone()
-        }
-        .blended(own, freedom, target, share)
+        other.blended(own, freedom, target, share, second)
     }
 
     /// The covariance of the second-order numbers of these recordings: this one's with variances that are theirs as far as
@@ -202,19 +193,10 @@ impl Scatter {
             return Some(self.second.clone());
         }
         let freedom = (sets - 1) as f64;
-        let mut variances = DVector::zeros(SECOND);
-        for copy in recordings.chunks(sets) {
-            let sum: DVector<f64> = copy.iter().map(|recording| &recording.second).sum();
-            let mean = sum / sets as f64;
-            for recording in copy {
-                let deviation = &recording.second - &mean;
-                variances += deviation.component_mul(&deviation) / (freedom * copies as f64);
-            }
-        }
         let l = self.second.l();
         let others = &l * l.transpose();
         let bias = digamma(freedom / 2.0) - (freedom / 2.0).ln();
-        let apart = variances
+        let apart = variances_of_second(recordings, copies)
             .component_div(&others.diagonal())
             .map(|ratio| ratio.ln() - bias);
         let by_chance = SECOND as f64 * variance_of_log(freedom);
@@ -243,16 +225,23 @@ impl Scatter {
         if share == 1.0 {
             return Some(self.clone());
         }
-        self.blended(own, freedom, common, share)
+        self.blended(own, freedom, common, share, self.second.clone())
     }
 
-    /// A covariance of one lap blended with a share of a target; the rest is this scatter's.
-    fn blended(&self, own: DMatrix<f64>, freedom: f64, target: DMatrix<f64>, share: f64) -> Option<Self> {
+    /// A covariance of one lap blended with a share of a target, and one of the second-order numbers; the rest is this scatter's.
+    fn blended(
+        &self,
+        own: DMatrix<f64>,
+        freedom: f64,
+        target: DMatrix<f64>,
+        share: f64,
+        second: Cholesky<f64, Dyn>,
+    ) -> Option<Self> {
         let freedom = ((1.0 - share).powi(2) / freedom + share.powi(2) / self.freedom).recip();
         Self::with(
             own * (1.0 - share) + target * share,
             freedom,
-            self.second.clone(),
+            second,
             self.open.clone(),
             self.axes.clone(),
         )
@@ -266,8 +255,7 @@ impl Scatter {
         for direction in directions {
             open.ger(laps / directions.len() as f64, direction, direction, 1.0);
         }
-        let l = self.lap.l();
-        let mean = (&l * l.transpose() + &open).cholesky()?;
+        let mean = (self.of_lap() + &open).cholesky()?;
         Some(Self { mean, open, ..self })
     }
 
@@ -341,6 +329,21 @@ fn pooled<'a>(recordings: impl Iterator<Item = &'a Recording>, size: usize) -> (
     }
     let freedom = freedom as f64;
     (lap / freedom, freedom)
+}
+
+/// Variances of the second-order numbers between recordings; of copies, one after the other, each about its own mean.
+fn variances_of_second(recordings: &[&Recording], copies: usize) -> DVector<f64> {
+    let sets = recordings.len() / copies;
+    let mut variances = DVector::zeros(SECOND);
+    for copy in recordings.chunks(sets) {
+        let sum: DVector<f64> = copy.iter().map(|recording| &recording.second).sum();
+        let mean = sum / sets as f64;
+        for recording in copy {
+            let deviation = &recording.second - &mean;
+            variances += deviation.component_mul(&deviation) / ((sets - 1) as f64 * copies as f64);
+        }
+    }
+    variances
 }
 
 /// The principal axes of a covariance, the longest first.

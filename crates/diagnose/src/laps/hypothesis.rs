@@ -18,7 +18,7 @@ pub(super) enum Shape {
 }
 
 /// One effect of a hypothesis.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub(super) struct Part {
     pub(super) probe: usize,
     pub(super) shape: Shape,
@@ -33,7 +33,7 @@ pub(super) struct Part {
 }
 
 /// Effects that act together.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub(super) struct Hypothesis {
     pub(super) parts: Vec<Part>,
 }
@@ -146,13 +146,16 @@ impl Part {
         })
     }
 
+    /// Its size, the mean over the runs.
+    fn mean_size(&self, atlas: &Atlas) -> f64 {
+        let size = atlas.probes[self.probe].size_index();
+        self.values.iter().map(|values| values[size]).sum::<f64>() / self.values.len() as f64
+    }
+
     /// The same at its mean size.
     fn plain(&self, atlas: &Atlas) -> Self {
-        let size = atlas.probes[self.probe].size_index();
-        let count = self.values.len() as f64;
-        let mean = self.values.iter().map(|values| values[size]).sum::<f64>() / count;
         let mut values = self.values[0].clone();
-        values[size] = mean + self.per_s * middle_s(atlas);
+        values[atlas.probes[self.probe].size_index()] = self.mean_size(atlas) + self.per_s * middle_s(atlas);
         Self {
             shape: Shape::Constant,
             values: vec![values],
@@ -301,19 +304,14 @@ impl Hypothesis {
 
     /// The same with the pattern of its only effect that has one given to each of the others instead.
     pub(super) fn with_pattern_elsewhere(&self, atlas: &Atlas) -> Vec<Self> {
-        let patterned = |part: &&Part| part.shape != Shape::Constant;
-        let (Some(plain), Some(shape)) = (
-            self.without_patterns(atlas),
-            self.parts.iter().find(patterned).map(|part| part.shape),
-        ) else {
+        let mut patterned = self.parts.iter().filter(|part| part.shape != Shape::Constant);
+        let (Some(one), None) = (patterned.next(), patterned.next()) else {
             return Vec::new();
         };
-        if self.parts.iter().filter(patterned).count() > 1 {
-            return Vec::new();
-        }
+        let plain: Vec<Part> = self.parts.iter().map(|part| part.plain(atlas)).collect();
         let given = |(i, part): (usize, &Part)| {
-            let mut parts = plain.parts.clone();
-            parts[i] = part.over(shape, atlas)?;
+            let mut parts = plain.clone();
+            parts[i] = part.over(one.shape, atlas)?;
             Some(Self { parts })
         };
         self.parts.iter().enumerate().filter_map(given).collect()
@@ -362,13 +360,10 @@ impl Hypothesis {
     pub(super) fn weight(&self, part: usize, atlas: &Atlas) -> f64 {
         let part = &self.parts[part];
         let nodes = atlas.nodes(part.probe);
-        let size = atlas.probes[part.probe].free[0].0;
-        let count = part.values.len() as f64;
-        let mean = part.values.iter().map(|values| values[size]).sum::<f64>() / count;
         if nodes.len() < 2 {
             return f64::INFINITY;
         }
-        at(&nodes, mean).norm_squared()
+        at(&nodes, part.mean_size(atlas)).norm_squared()
     }
 
     /// What counts of a gain in log-likelihood.

@@ -2,11 +2,11 @@
 
 use sim::Setting;
 
-use super::atlas::{Atlas, Simulate, white};
+use super::atlas::{Atlas, Simulate};
 use super::expectation::Expectation;
 use super::hypothesis::{Freedom, Hypothesis};
-use super::parabola::{Column, Local, nearest};
-use super::refine::{are_within_steps, errors_of};
+use super::parabola::{Column, Local, Nearest};
+use super::refine::are_within_steps;
 use crate::Error;
 
 /// A hypothesis at its most likely sizes, as parabolas over a few of their errors tell them.
@@ -54,10 +54,9 @@ impl Atlas {
                 break;
             };
             local.columns = local.columns.into_iter().map(Column::without_noise).collect();
-            let target = white(&local.scatter, &self.layout, data, &local.center.expectation);
-            let (moves, covariance) = nearest(&local.columns, &target, &freedoms);
+            let Nearest { moves, errors, .. } =
+                self.nearest(data, &local.center, &local.scatter, &local.columns, &freedoms);
             let found = self.quantised(self.with_moves(&look.found, &freedoms, &moves));
-            let errors = errors_of(&covariance, local.center.doubt);
             let certain = (errors.iter().zip(&freedoms))
                 .zip(&widest)
                 .all(|((error, freedom), widest)| {
@@ -116,7 +115,6 @@ impl Atlas {
         if alone {
             data.0[recording].means.truncate(1);
         }
-        let target = white(&local.scatter, &self.layout, &data, &local.center.expectation);
         let mut own = vec![self.layout.run(run)];
         if alone {
             own.extend([self.layout.trend(recording), self.layout.second(recording)]);
@@ -128,8 +126,8 @@ impl Atlas {
                 column.curvature.rows_mut(range.start, range.len()).fill(0.0);
             }
         }
-        let (moves, _) = nearest(&columns, &target, &look.freedoms);
-        let found = self.with_moves(&look.about, &look.freedoms, &moves);
+        let nearest = self.nearest(&data, &local.center, &local.scatter, &columns, &look.freedoms);
+        let found = self.with_moves(&look.about, &look.freedoms, &nearest.moves);
         // The run itself is as expected, and so has no say.
         let hunted = self.hunt_about(simulate, &data, &found).unwrap_or(found);
         Ok(self.quantised(hunted))

@@ -183,12 +183,44 @@ impl Column {
     }
 }
 
+/// Where parabolas are nearest to data.
+pub(super) struct Nearest {
+    pub(super) moves: DVector<f64>,
+    pub(super) covariance: DMatrix<f64>,
+    /// Standard errors of the moves, the simulation's own error included.
+    pub(super) errors: Vec<f64>,
+    /// What is left of the data there.
+    pub(super) left: White,
+    /// Log-likelihood that the moves are hoped to gain.
+    pub(super) hoped: f64,
+}
+
+impl Atlas {
+    /// Where parabolas through a simulated hypothesis are nearest to the data, in units of a scatter.
+    pub(super) fn nearest(
+        &self,
+        data: &Expectation,
+        center: &Evaluated,
+        scatter: &[Scatter],
+        columns: &[Column],
+        freedoms: &[Freedom],
+    ) -> Nearest {
+        let target = white(scatter, &self.layout, data, &center.expectation);
+        let (moves, covariance) = nearest(columns, &target, freedoms);
+        let left = left_of(columns, &target, &moves);
+        let variances = covariance.diagonal() * (1.0 + center.doubt.error);
+        Nearest {
+            errors: variances.iter().map(|variance| variance.sqrt()).collect(),
+            hoped: 0.5 * (target.norm_squared() - left.norm_squared()),
+            moves,
+            covariance,
+            left,
+        }
+    }
+}
+
 /// The moves that bring the parabolas nearest to the target, and their covariance.
-pub(super) fn nearest(
-    columns: &[Column],
-    target: &White,
-    freedoms: &[Freedom],
-) -> (DVector<f64>, DMatrix<f64>) {
+fn nearest(columns: &[Column], target: &White, freedoms: &[Freedom]) -> (DVector<f64>, DMatrix<f64>) {
     let count = columns.len();
     let mut moves = DVector::<f64>::zeros(count);
     let mut normal = DMatrix::identity(count, count);
@@ -253,7 +285,7 @@ fn covariance(columns: &[Column], normal: DMatrix<f64>) -> DMatrix<f64> {
 }
 
 /// What the parabolas at some moves leave of the target.
-pub(super) fn left_of(columns: &[Column], target: &White, moves: &DVector<f64>) -> White {
+fn left_of(columns: &[Column], target: &White, moves: &DVector<f64>) -> White {
     let mut left = target.clone();
     for (column, &m) in columns.iter().zip(moves.iter()) {
         left.axpy(-m, &column.slope, 1.0);

@@ -3,14 +3,14 @@
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::atlas::{Atlas, Simulate, white};
+use super::atlas::{Atlas, Simulate};
 use super::expectation::Expectation;
-use super::hypothesis::{Freedom, Hypothesis, Part};
-use super::likelihood::{Doubt, Fit};
-use super::parabola::{Column, Local, left_of, nearest};
+use super::hypothesis::{Freedom, Hypothesis};
+use super::likelihood::Fit;
+use super::parabola::{Column, Local, Nearest};
 use super::screen::price;
 use super::simulated::Evaluated;
-use super::tests_of_fit::{FourNumbers, HOPELESS_P};
+use super::tests_of_fit::{FourNumbers, HOPELESS_P, SIGNIFICANT_P};
 
 /// What is simulated in a round of a descent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -114,6 +114,11 @@ impl Descent {
         (self.remainder).is_some_and(|left| left.omnibus_p() < HOPELESS_P)
     }
 
+    /// Whether nothing significant is left, as far as a round saw.
+    pub(super) fn fits(&self) -> bool {
+        (self.remainder).is_some_and(|left| left.omnibus_p() >= SIGNIFICANT_P)
+    }
+
     /// Whether an earlier look still tells what its numbers do: they moved within its steps, not along noise, and little is
     /// left, which slopes that are a little off could be taken for.
     fn knows_its_slopes(&self) -> bool {
@@ -176,26 +181,30 @@ impl Atlas {
         let points = 2 * freedoms.len() as u64 + 1;
         let sets = self.enough(round.sets_around(points), points);
         let local = self.local(simulate, &hypothesis, &freedoms, sets)?;
-        let Evaluated {
-            expectation, doubt, ..
-        } = &local.center;
-        let target = white(&local.scatter, &self.layout, data, expectation);
-        let (moves, covariance) = nearest(&local.columns, &target, &freedoms);
-        let left = left_of(&local.columns, &target, &moves);
-        let hoped = 0.5 * (target.norm_squared() - left.norm_squared());
-        let fit = self.fit_of(data, left, &local.scatter, *doubt);
+        let Local {
+            center,
+            scatter,
+            columns,
+        } = &local;
+        let Nearest {
+            moves,
+            covariance,
+            errors,
+            left,
+            hoped,
+        } = self.nearest(data, center, scatter, columns, &freedoms);
+        let fit = self.fit_of(data, left, scatter, center.doubt);
         let gain = if round == Round::Rough {
             fit.gain + fit.lost_to_doubt
         } else {
             let sets = self.enough(round.sets(), 1);
-            let center = self.evaluate_more(simulate, &hypothesis, local.center.clone(), sets)?;
+            let center = self.evaluate_more(simulate, &hypothesis, center.clone(), sets)?;
             self.likely_gain(data, &center)? + hoped
         };
         let hypothesis = self.with_moves(&hypothesis, &freedoms, &moves);
         let found = full && is_settled(&moves, &covariance, &freedoms);
         let holds = are_within_steps(&moves, &freedoms);
         let remainder = full.then(|| FourNumbers::new(&fit.residual, &self.layout));
-        let errors = errors_of(&covariance, *doubt);
         for (i, freedom) in freedoms.iter_mut().enumerate() {
             // The parabola should hold where the answer may lie, and be wide enough for the noise of its points not to
             // pass for information.
@@ -238,35 +247,26 @@ impl Atlas {
         let columns: Vec<Column> = (local.columns.iter().zip(moved.iter()))
             .map(|(column, moved)| column.from(*moved))
             .collect();
-        let target = white(&local.scatter, &self.layout, data, &center.expectation);
-        let (moves, covariance) = nearest(&columns, &target, &freedoms);
-        let left = left_of(&columns, &target, &moves);
-        let hoped = 0.5 * (target.norm_squared() - left.norm_squared());
+        let Nearest {
+            moves,
+            covariance,
+            errors,
+            left,
+            hoped,
+        } = self.nearest(data, &center, &local.scatter, &columns, &freedoms);
         let fit = self.fit_of(data, left, &local.scatter, center.doubt);
-        let errors = errors_of(&covariance, center.doubt);
         let gain = self.likely_gain(data, &center)? + hoped;
         let found = full && is_settled(&moves, &covariance, &freedoms);
         let remainder = Some(FourNumbers::new(&fit.residual, &self.layout));
-        if found
-            && moves
-                .iter()
-                .zip(&errors)
-                .all(|(moved, error)| moved.abs() < AT_REST * error)
-        {
-            return Some(Descent {
-                score: descent.hypothesis.worth(gain) - self.price_of(&descent.hypothesis),
-                remainder,
-                near: Some((local, moved)),
-                freedoms,
-                errors,
-                found,
-                end: Some(center),
-                ..descent
-            });
-        }
-        let hypothesis = self.with_moves(&descent.hypothesis, &freedoms, &moves);
+        let at_rest =
+            found && (moves.iter().zip(&errors)).all(|(moved, error)| moved.abs() < AT_REST * error);
+        let (hypothesis, moved, end) = if at_rest {
+            (descent.hypothesis, moved, Some(center))
+        } else {
+            let hypothesis = self.with_moves(&descent.hypothesis, &freedoms, &moves);
+            (hypothesis, moved + moves, None)
+        };
         let score = hypothesis.worth(gain) - self.price_of(&hypothesis);
-        let moved = moved + moves;
         Some(Descent {
             score,
             progress: score - descent.score,
@@ -275,7 +275,7 @@ impl Atlas {
             near: Some((local, moved)),
             looks,
             found,
-            end: None,
+            end,
             hypothesis,
             freedoms,
             errors,
@@ -315,10 +315,8 @@ impl Atlas {
         {
             return None;
         }
-        let moved = |(a, b): (&Part, &Part)| a.values != b.values;
-        let as_found = !(hypothesis.parts.iter().zip(&found.hypothesis.parts)).any(moved);
         let end = match &found.end {
-            Some(end) if as_found => end.clone(),
+            Some(end) if hypothesis == found.hypothesis => end.clone(),
             _ => self.evaluate(simulate, &hypothesis, self.enough(END_SETS, 1))?,
         };
         let fit = self.fit(data, &end)?;
@@ -385,12 +383,6 @@ impl Atlas {
         }
         hypothesis
     }
-}
-
-/// Standard errors of numbers with a covariance, the simulation's own error included.
-pub(super) fn errors_of(covariance: &DMatrix<f64>, doubt: Doubt) -> Vec<f64> {
-    let variances = covariance.diagonal() * (1.0 + doubt.error);
-    variances.iter().map(|variance| variance.sqrt()).collect()
 }
 
 /// Whether numbers stayed where their parabolas were made.

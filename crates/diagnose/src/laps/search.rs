@@ -284,7 +284,7 @@ impl Search<'_> {
             let Some(first) = alive.first() else {
                 break;
             };
-            let (best, hopeless, fits) = (first.score, is_hopeless(first), fits(first));
+            let (best, hopeless, fits) = (first.score, is_hopeless(first), first.fits());
             let bar = best.max(reached);
             alive.retain(|d| d.score >= bar - behind.max(share * bar));
             alive = self.without_repeats(alive);
@@ -433,10 +433,6 @@ fn may_catch_up(descent: &Descent, best: f64) -> bool {
     const NEAR: f64 = 25.0;
     let missing = best - descent.score;
     missing < NEAR || descent.progress > SLOW * missing
-}
-
-fn fits(descent: &Descent) -> bool {
-    (descent.remainder).is_some_and(|left| left.omnibus_p() >= SIGNIFICANT_P)
 }
 
 /// The descent with the best score.

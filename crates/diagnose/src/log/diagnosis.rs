@@ -18,6 +18,7 @@ use super::rows::LogRow;
 use super::screen::normals;
 use super::search::{By, Lead, Refined, leads, price, pursue, shortlist, tail, together};
 use super::steps::reading_step;
+use crate::answer::{ALTERNATIVE, indistinguishable};
 use crate::corners::{Corners, EXACT};
 use crate::{Answer, Candidate, Cause, Error, Explanation, Verdict};
 
@@ -106,8 +107,6 @@ const ALARM: f64 = 0.01;
 const FAULTS: f64 = 0.01;
 /// A probability below which a remainder is significant.
 const SIGNIFICANT_P: f64 = 1e-3;
-/// Explanations within this log-likelihood of the best are alternatives.
-const ALTERNATIVE: f64 = 5.0;
 /// Share of the explained log-likelihood that a remainder may have at very high signal.
 const MATTERS: f64 = 0.02;
 
@@ -509,11 +508,7 @@ impl<'a> Search<'a> {
         } else {
             self.unlisted.as_ref().map(|unnamed| unnamed.cause.clone())
         };
-        let indistinguishable = explanations.first().map_or(0, |best| {
-            (explanations.iter())
-                .take_while(|e| e.score > best.score - ALTERNATIVE && e.effects.len() == best.effects.len())
-                .count()
-        });
+        let indistinguishable = indistinguishable(explanations.iter(), ALTERNATIVE);
         let runs = self.evidence.runs().last().map_or(0, |last| last + 1);
         let mut answer = Answer {
             verdict,
