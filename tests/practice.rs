@@ -69,14 +69,31 @@ fn a_larger_wheel_of_the_rule_based_robot_is_named() {
 }
 
 #[test]
-fn a_gain_that_differs_by_run_is_seen_to() {
-    let trace = laps("braitenberg", "gain_by_run");
+fn a_gain_that_differs_by_run_is_seen_to_and_then_nothing_is_left() {
+    share_signatures("braitenberg");
+    let (scratch, measured) = (Scratch::new(), practice("gain_by_run"));
+    let trace = trace(&scratch, "braitenberg", &measured, &[]);
     assert_eq!(trace["verdict"], "explained", "{trace:#}");
     let claimed = names(&trace);
     assert!(claimed.len() == 1 && GAINS.contains(&claimed[0]), "{claimed:?}");
     assert_eq!(trace["effects"][0]["by"], "run");
     let parameter = &trace["effects"][0]["parameters"][0];
     assert_eq!(parameter["value"].as_array().unwrap().len(), 4, "{parameter}");
+    let model = scratch.path("out/model.after.toml");
+    let model = model.to_str().unwrap();
+    let args = [
+        "trace",
+        model,
+        "--measured",
+        &measured,
+        "--out",
+        "again",
+        "--no-cache",
+        "--quiet",
+    ];
+    scratch.done(args);
+    let again: Value = serde_json::from_str(&scratch.read("again/trace.json")).unwrap();
+    says(&again, "faithful", &[]);
 }
 
 #[test]

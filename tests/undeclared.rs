@@ -111,6 +111,17 @@ fn a_listed_effect_under_another_name_is_named_from_laps() {
 }
 
 #[test]
+fn a_battery_that_sags_is_sized_wherever_the_runs_began() {
+    const PER_S: f64 = 1.5e-4;
+    share_signatures("braitenberg");
+    let scratch = Scratch::new();
+    Robot::with(Setting::constant(sim::find("battery-sag").unwrap(), [PER_S])).record(&scratch, "set");
+    let found = trace(&scratch, "braitenberg", "set", &[]);
+    says(&found, "explained", &["battery-sag"]);
+    holds(&found["effects"][0], "per_s", PER_S, 0.0);
+}
+
+#[test]
 fn sensors_that_warm_up_are_a_gain_that_changes_in_time() {
     share_signatures("braitenberg");
     let scratch = Scratch::new();

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use anyhow::{Context, Result, bail};
 use pdm::Cluster;
 use rayon::prelude::*;
-use sim::{Circuit, Drive, Vec2};
+use sim::{Circuit, Drive, Start, Vec2};
 use track::{Lap, LapTracker, Way};
 
 use crate::config::Config;
@@ -27,12 +27,14 @@ pub(crate) struct SampledRun {
     pub(crate) wanted: usize,
     /// Whether the run ended because gate 0 was not crossed for too long.
     pub(crate) timed_out: bool,
+    /// Time of the run's first row, s.
+    pub(crate) began_s: f64,
 }
 
 impl SampledRun {
     /// The laps to keep among all whole laps of a run, in order: the first is dropped, those that miss a gate are set
     /// aside, and of the others the first `wanted` kept.
-    pub(crate) fn new(set: &str, run: &str, whole: &[Lap], wanted: usize) -> Self {
+    pub(crate) fn new(set: &str, run: &str, whole: &[Lap], wanted: usize, began_s: f64) -> Self {
         let mut laps = Vec::with_capacity(wanted);
         let mut set_aside = Vec::new();
         for (number, lap) in whole.iter().enumerate().skip(1) {
@@ -51,6 +53,23 @@ impl SampledRun {
             set_aside,
             wanted,
             timed_out: false,
+            began_s,
+        }
+    }
+
+    /// Where a simulated run must start for its first kept lap to begin as long after the start as this one's.
+    pub(crate) fn start(&self) -> Start {
+        let lap = &self.laps[0];
+        // The dropped lap took about as long.
+        let until_lap_s = lap.start_s - self.began_s;
+        let until_s = |gate: usize| lap.end_s - lap.times_s[gate] + lap.duration_s();
+        let off_s = |&gate: &usize| (until_s(gate) - until_lap_s).abs();
+        // A run that starts on gate 0 may cross it at once or a lap later.
+        let gate = (1..lap.times_s.len()).min_by(|a, b| off_s(a).total_cmp(&off_s(b)));
+        let gate = gate.unwrap_or(0);
+        Start {
+            gate,
+            time_s: until_lap_s - until_s(gate),
         }
     }
 
@@ -150,7 +169,8 @@ fn sample(set: &DataSet, run: &RunFile, circuit: &Circuit, way: Way) -> Result<S
     let whole: Vec<Lap> = seen
         .filter_map(|(t, [x, y])| tracker.push(t, Vec2::new(x, y)))
         .collect();
-    let sampled = SampledRun::new(&set.name, &run.name, &whole, set.laps);
+    let began_s = run.rows.t_s.first().copied().unwrap_or_default();
+    let sampled = SampledRun::new(&set.name, &run.name, &whole, set.laps, began_s);
     if sampled.laps.is_empty() {
         let path = run.path.display();
         if let Some((lap, gate)) = sampled.set_aside.first() {
@@ -177,7 +197,7 @@ pub(crate) fn simulated(name: &str, run: usize, drive: &Drive, wanted: usize) ->
         .chain(&drive.laps)
         .cloned()
         .collect();
-    let sampled = SampledRun::new(name, &crate::dataset::run_name(run), &whole, wanted);
+    let sampled = SampledRun::new(name, &crate::dataset::run_name(run), &whole, wanted, 0.0);
     SampledRun {
         timed_out: drive.timed_out,
         ..sampled
@@ -190,4 +210,44 @@ pub(crate) fn mean_and_deviation(values: &[f64]) -> (f64, f64) {
     let mean = values.iter().sum::<f64>() / n;
     let squares: f64 = values.iter().map(|v| (v - mean) * (v - mean)).sum();
     (mean, (squares / (n - 1.0)).sqrt())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Laps of 50 s that pass 100 gates evenly, the first of them begun then.
+    fn run(first_s: f64, began_s: f64) -> SampledRun {
+        let lap = |k: usize| {
+            let start_s = first_s + 50.0 * k as f64;
+            Lap {
+                offsets_m: vec![0.0; 100],
+                times_s: (0..100).map(|gate| start_s + 0.5 * f64::from(gate)).collect(),
+                start_s,
+                end_s: start_s + 50.0,
+                missed: Vec::new(),
+            }
+        };
+        let whole: Vec<Lap> = (0..4).map(lap).collect();
+        SampledRun::new("set", "a", &whole, 3, began_s)
+    }
+
+    #[test]
+    fn a_simulated_run_starts_where_the_measured_one_did() {
+        // Gate 60 is 20 s before gate 0.
+        let start = run(23.0, 3.0).start();
+        assert_eq!(start.gate, 60);
+        assert!(start.time_s.abs() < 1e-9, "{start:?}");
+        // Between gates: 0.1 s after gate 60.
+        let start = run(22.9, 3.0).start();
+        assert_eq!(start.gate, 60);
+        assert!((start.time_s + 0.1).abs() < 1e-9, "{start:?}");
+    }
+
+    #[test]
+    fn a_run_that_had_driven_before_it_was_seen_has_a_clock_ahead() {
+        let start = run(123.0, 3.0).start();
+        assert_eq!(start.gate, 1);
+        assert!((start.time_s - 70.5).abs() < 1e-9, "{start:?}");
+    }
 }

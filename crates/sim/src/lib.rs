@@ -34,7 +34,7 @@ pub use model::{Machine, Model, RunRules, WallRules};
 pub use noise::{Stream, Streams};
 pub use outlook::{Look, Outlook};
 pub use robot::{Pose, Robot, Twist, WheelSpeeds};
-pub use run::{Drive, Run, Step, drive};
+pub use run::{Drive, Run, Start, Step, drive, drive_from};
 pub use sensor::{Beam, Combine, Mount, ReadingNoise, Readings, Response};
 pub use track::Vec2;
 pub use walls::{WallPlace, Walls};

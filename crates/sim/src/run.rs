@@ -23,12 +23,22 @@ pub struct Step {
     pub command: WheelSpeeds,
 }
 
+/// Where a run starts, and what its clock shows then.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Start {
+    /// Number of the gate.
+    pub gate: usize,
+    /// Time since the run began, s: 0 but where the simulated start is not the run's.
+    pub time_s: f64,
+}
+
 /// Everything that changes while a robot drives.
 #[derive(Debug)]
 pub struct Run<'w> {
     apparatus: Apparatus<'w>,
     pose: Pose,
     command: WheelSpeeds,
+    start_s: f64,
     steps: u64,
     next_gate: usize,
     stretch: u64,
@@ -44,13 +54,34 @@ impl<'w> Run<'w> {
     /// # Errors
     /// An effect without values for this run.
     pub fn new(world: &'w World<'w>, streams: Streams) -> Result<Self, Error> {
-        let mut start = streams.open("start");
+        Self::begin(world, streams, None)
+    }
+
+    /// A robot that starts on a given gate, beside its centre and turned as [`Run::new`] would have it. Each lap meets the draws
+    /// that it would meet there.
+    ///
+    /// # Errors
+    /// As [`Run::new`].
+    pub fn from_start(world: &'w World<'w>, streams: Streams, start: Start) -> Result<Self, Error> {
+        Self::begin(world, streams, Some(start))
+    }
+
+    fn begin(world: &'w World<'w>, streams: Streams, given: Option<Start>) -> Result<Self, Error> {
+        let mut draws = streams.open("start");
         let gates = &world.circuit().gates;
-        let gate = start.index(gates.len());
+        let drawn = draws.index(gates.len());
         let (offset_m, turn_rad) = (
-            world.rules().start_offset_m * start.symmetric(),
-            world.rules().start_heading_rad * start.symmetric(),
+            world.rules().start_offset_m * draws.symmetric(),
+            world.rules().start_heading_rad * draws.symmetric(),
         );
+        let Start { gate, time_s } = given.unwrap_or(Start {
+            gate: drawn,
+            time_s: 0.0,
+        });
+        let to_lap = |gate| match world.rules().way {
+            Way::Forward => gates.len() - gate,
+            Way::Backward => gate,
+        };
         let forward = world.forward(gate);
         let center = gates[gate].center + gates[gate].left * offset_m;
         let pose = Pose::new(center.x, center.y, forward.y.atan2(forward.x) + turn_rad);
@@ -58,9 +89,10 @@ impl<'w> Run<'w> {
             apparatus: Apparatus::new(world, &[])?,
             pose,
             command: WheelSpeeds::default(),
+            start_s: time_s,
             steps: 0,
             next_gate: gate,
-            stretch: 0,
+            stretch: (to_lap(drawn) as u64).wrapping_sub(to_lap(gate) as u64),
             contacts: 0,
             slip: streams.open("slip"),
             sense: streams.open("sense"),
@@ -82,7 +114,7 @@ impl<'w> Run<'w> {
 
     /// Drives for one control step.
     pub fn step(&mut self) -> Step {
-        let time_s = self.steps as f64 * self.apparatus.world.rules().control_step_s;
+        let time_s = self.start_s + self.steps as f64 * self.apparatus.world.rules().control_step_s;
         self.apparatus.advance(time_s);
         let mut now = Moment {
             time_s,
@@ -277,7 +309,7 @@ impl<'w> Run<'w> {
             Way::Forward => (self.next_gate + 1) % count,
             Way::Backward => (self.next_gate + count - 1) % count,
         };
-        self.stretch += 1;
+        self.stretch = self.stretch.wrapping_add(1);
         self.slip.enter(self.stretch);
         self.sense.enter(self.stretch);
         self.camera.enter(self.stretch);
@@ -306,13 +338,35 @@ pub fn drive(
     world: &World<'_>,
     streams: Streams,
     laps: usize,
+    record: impl FnMut(&Step),
+) -> Result<Drive, Error> {
+    drive_on(Run::new(world, streams)?, world, laps, record)
+}
+
+/// [`drive`] from a given start.
+///
+/// # Errors
+/// As [`drive`].
+pub fn drive_from(
+    world: &World<'_>,
+    streams: Streams,
+    start: Start,
+    laps: usize,
+    record: impl FnMut(&Step),
+) -> Result<Drive, Error> {
+    drive_on(Run::from_start(world, streams, start)?, world, laps, record)
+}
+
+fn drive_on<'w>(
+    mut run: Run<'w>,
+    world: &'w World<'w>,
+    laps: usize,
     mut record: impl FnMut(&Step),
 ) -> Result<Drive, Error> {
-    let mut run = Run::new(world, streams)?;
     let mut tracker = LapTracker::new(&world.circuit().gates, world.rules().way);
     let mut done: Vec<Lap> = Vec::with_capacity(laps + 1);
     let patience_s = world.rules().patience_laps * world.nominal_lap_s();
-    let mut latest_s = 0.0;
+    let mut latest_s = run.start_s;
     let timed_out = loop {
         let step = run.step();
         record(&step);
@@ -343,3 +397,38 @@ pub fn drive(
 
 /// Steps recorded after the last lap has closed, so that it also closes in a file whose positions are rounded.
 const SPARE_STEPS: usize = 8;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effects::testing::{declared, scene};
+
+    const LAPS: usize = 3;
+
+    #[test]
+    fn a_run_from_the_gate_that_it_would_draw_is_the_same() {
+        let world = scene().world(&declared(), 0).unwrap();
+        let streams = Streams { seed: 4, run: 2 };
+        let gate = streams.open("start").index(world.circuit().gates.len());
+        let start = Start { gate, time_s: 0.0 };
+        let drawn = drive(&world, streams, LAPS, |_| {}).unwrap();
+        assert_eq!(drive_from(&world, streams, start, LAPS, |_| {}).unwrap(), drawn);
+    }
+
+    #[test]
+    fn runs_start_where_and_when_they_are_told() {
+        for way in [Way::Forward, Way::Backward] {
+            let mut model = declared();
+            model.run.way = way;
+            let world = scene().world(&model, 0).unwrap();
+            for gate in [20, 70] {
+                let start = Start { gate, time_s: 1000.0 };
+                let streams = Streams { seed: 4, run: 0 };
+                let lap = &drive_from(&world, streams, start, 1, |_| {}).unwrap().laps[0];
+                // The way to gate 0 and the dropped lap.
+                let until_s = lap.end_s - lap.times_s[gate] + lap.duration_s();
+                assert!((lap.start_s - 1000.0 - until_s).abs() < 1.0, "{way:?} {gate}");
+            }
+        }
+    }
+}

@@ -2,10 +2,12 @@
 
 use anyhow::{Context, Result};
 use rayon::prelude::*;
-use sim::{Pattern, Setting, Streams};
+use sim::{Setting, Streams};
 
 use crate::laps::SampledRun;
 use crate::setup::Setup;
+
+use super::recording::RunPlace;
 
 /// Runs behind every mean lap, each of at least 20 laps.
 const RUNS: u64 = 32;
@@ -26,15 +28,17 @@ pub(crate) struct MeanLaps {
 }
 
 impl MeanLaps {
-    /// Simulates a model with effects: 32 runs of `laps` laps. By run, the runs take the effects' values in turn.
-    pub(crate) fn new(setup: &Setup, effects: &[Setting], seed: u64, laps: usize) -> Result<Self> {
+    /// Simulates a model with effects: 32 runs of `laps` laps, which take the places of some measured runs in turn.
+    pub(crate) fn new(
+        setup: &Setup,
+        effects: &[Setting],
+        seed: u64,
+        laps: usize,
+        places: &[RunPlace],
+    ) -> Result<Self> {
         let mut model = setup.model.clone();
         model.effects.extend_from_slice(effects);
-        let variants = effects.iter().filter_map(|effect| match &effect.pattern {
-            Pattern::ByRun(runs) => Some(runs.len()),
-            _ => None,
-        });
-        let different = variants.min().unwrap_or(1);
+        let changes = model.effects.iter().any(Setting::depends_on_time);
         let drives: Vec<sim::Drive> = (0..RUNS)
             .into_par_iter()
             .map(|i| {
@@ -42,8 +46,13 @@ impl MeanLaps {
                     seed: seed + SEED_OFFSET + i / RUNS_PER_SEED,
                     run: i % RUNS_PER_SEED,
                 };
-                let world = setup.scene.world(&model, i as usize % different)?;
-                sim::drive(&world, streams, laps, |_| {})
+                let place = places[i as usize % places.len()];
+                let world = setup.scene.world(&model, place.number)?;
+                if changes {
+                    sim::drive_from(&world, streams, place.start, laps, |_| {})
+                } else {
+                    sim::drive(&world, streams, laps, |_| {})
+                }
             })
             .collect::<Result<_, _>>()?;
         let closed = |drive: &sim::Drive| -> Vec<Vec<f64>> {

@@ -14,7 +14,7 @@ use std::path::Path;
 
 use anyhow::{Result, ensure};
 use diagnose::{Answer, Atlas, Baselines, Detectable, FourNumbers, Simulate};
-use sim::{Pattern, Setting};
+use sim::Setting;
 
 use answer::{FromLogs, from_logs, log_rows};
 pub(crate) use cache::Cache;
@@ -22,7 +22,7 @@ pub(crate) use document::{document, parameters};
 pub(crate) use error::{MeanLaps, mean};
 use next::{Experiment, experiments};
 pub(crate) use pages::{digest, gates_csv, sections, summary};
-use recording::{Recording, Seeds, held_out, simulate_all};
+use recording::{Recording, RunPlace, Seeds, held_out, simulate_all};
 
 use crate::config::{Config, ModelFile};
 use crate::dataset::DataSet;
@@ -84,10 +84,11 @@ impl Trace {
         unseen: Option<DataSet>,
         cache: &Cache,
     ) -> Result<Self> {
-        let recordings: Vec<Recording> = sets
-            .into_iter()
-            .map(|set| Recording::new(session, file, world, set))
-            .collect::<Result<_>>()?;
+        let mut recordings: Vec<Recording> = Vec::with_capacity(sets.len());
+        for set in sets {
+            let first_run = runs(&recordings).count();
+            recordings.push(Recording::new(session, file, world, set, first_run)?);
+        }
         let unseen = unseen.map(|set| held_out(&recordings, file, set)).transpose()?;
         let seed = session.seed();
         let simulate =
@@ -119,7 +120,7 @@ impl Trace {
         let progress = session.progress("naming the effect", 1);
         let (residual, answer, from_logs) = match logged {
             Some((place, rows)) => {
-                let first: usize = recordings[..place].iter().map(|r| r.measured.runs.len()).sum();
+                let first = recordings[place].first_run;
                 let own = first..first + rows.len();
                 let found = from_logs(&recordings[place].setup, &rows, own, &atlas, &simulate, &laps);
                 interrupt::check()?;
@@ -215,42 +216,50 @@ fn errors(
     seed: u64,
 ) -> Result<Vec<Errors>> {
     let mut all = Vec::new();
-    let mut first_run = 0;
     for (place, recording) in recordings.iter().enumerate() {
-        let count = recording.measured.runs.len();
-        let own = first_run..first_run + count;
-        first_run += count;
+        let places = recording.places();
         let wanted = recording.shape().into_iter().fold(LAPS, usize::max);
-        let laps_of = |effects: &[Setting]| MeanLaps::new(&recording.setup, effects, seed, wanted);
-        let before = laps_of(&[])?;
-        let settings: Vec<Setting> = answer.settings().iter().map(|s| slice(s, own.clone())).collect();
+        let laps_of = |effects: &[Setting], places: &[RunPlace]| {
+            MeanLaps::new(&recording.setup, effects, seed, wanted, places)
+        };
+        let before = laps_of(&[], &places)?;
+        let settings = answer.settings();
         let after = if settings.is_empty() {
             before.clone()
         } else {
-            laps_of(&settings)?
+            laps_of(&settings, &places)?
         };
-        let (held_out, after_m) = match &unseen {
+        let (held_out, before_m, after_m) = match &unseen {
             Some((at, _)) if *at != place => continue,
             Some((_, runs)) => (
                 runs.clone(),
+                runs.iter().map(|run| before.distance_m(run)).collect(),
                 runs.iter().map(|run| after.distance_m(run)).collect(),
             ),
             None => {
                 let runs = recording.measured.runs.clone();
-                let distance = |(run, at): (&SampledRun, usize)| {
-                    let without: Vec<Setting> =
-                        answer.left_out[at].iter().map(|s| slice(s, at..at + 1)).collect();
-                    if without.is_empty() {
-                        return Ok(before.distance_m(run));
-                    }
-                    Ok(laps_of(&without)?.distance_m(run))
-                };
-                let distances = runs.iter().zip(own).map(distance).collect::<Result<Vec<f64>>>()?;
-                (runs, distances)
+                let (mut before_m, mut after_m) = (Vec::new(), Vec::new());
+                for (at, run) in runs.iter().enumerate() {
+                    let without = &answer.left_out[places[at].number];
+                    let distance_m =
+                        |effects| anyhow::Ok(laps_of(effects, &places[at..=at])?.distance_m(run));
+                    let own_m = if recording.runs_are_alike() {
+                        before.distance_m(run)
+                    } else {
+                        distance_m(&[])?
+                    };
+                    before_m.push(own_m);
+                    after_m.push(if without.is_empty() {
+                        own_m
+                    } else {
+                        distance_m(without)?
+                    });
+                }
+                (runs, before_m, after_m)
             }
         };
         all.push(Errors {
-            before_m: held_out.iter().map(|run| before.distance_m(run)).collect(),
+            before_m,
             floor_m: held_out.iter().map(|run| after.floor_m(run.laps.len())).collect(),
             held_out,
             before,
@@ -261,18 +270,6 @@ fn errors(
     Ok(all)
 }
 
-/// A setting for some of the runs.
-fn slice(setting: &Setting, runs: std::ops::Range<usize>) -> Setting {
-    let pattern = match &setting.pattern {
-        Pattern::ByRun(values) => Pattern::ByRun(values[runs].to_vec()),
-        other => other.clone(),
-    };
-    Setting {
-        spec: setting.spec,
-        pattern,
-    }
-}
-
 /// What the declared model and its other cuts simulate for one recording.
 fn with_simulations<R>(
     recording: &Recording,
@@ -281,7 +278,7 @@ fn with_simulations<R>(
 ) -> R {
     let of = |setup| {
         move |effects: &[Setting], set: u64| {
-            recording.simulate(setup, effects, Seeds { session: seed, set }, 0)
+            recording.simulate_anywhere(setup, effects, Seeds { session: seed, set })
         }
     };
     let declared = of(&recording.setup);
@@ -322,11 +319,15 @@ impl Purpose {
 fn atlas(session: &Session, recording: &Recording, purpose: Purpose, cache: &Cache) -> Result<Atlas> {
     let Recording { config, world, .. } = recording;
     let shape = recording.shape();
-    let key = format!(
+    let alike = recording.runs_are_alike();
+    let mut key = format!(
         "{purpose:?}\n{}\n{world}\n{shape:?}\n{}",
         config.to_toml(),
         session.seed()
     );
+    if !alike {
+        key += &format!("\n{:?}", recording.places());
+    }
     if let Some(atlas) = cache.get(&key) {
         return Ok(atlas);
     }
@@ -337,8 +338,8 @@ fn atlas(session: &Session, recording: &Recording, purpose: Purpose, cache: &Cac
     let progress = session.progress(doing, purpose.sets(recording.cuts.len()));
     let tick = || progress.tick(1);
     let atlas = with_simulations(recording, session.seed(), |declared, cuts| match purpose {
-        Purpose::Name => Atlas::new(declared, cuts, &tick),
-        Purpose::Judge => Atlas::without_effects(declared, cuts, &tick),
+        Purpose::Name => Atlas::new(declared, cuts, alike, &tick),
+        Purpose::Judge => Atlas::without_effects(declared, cuts, alike, &tick),
     });
     drop(progress);
     interrupt::check()?;

@@ -153,7 +153,14 @@ fn by_laps(
     seed: u64,
 ) -> Option<Vec<(String, f64)>> {
     let simulate = |effects: &[Setting], set: u64| -> Option<Vec<Vec<Lap>>> {
-        Recording::drive(setup, effects, Seeds { session: seed, set }, &[LAPS; RUNS], 0)
+        Recording::drive(
+            setup,
+            effects,
+            Seeds { session: seed, set },
+            &[LAPS; RUNS],
+            &[],
+            0,
+        )
     };
     let rivals: Vec<Rival> = (others.iter())
         .map(|other| Rival {

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use anyhow::{Context, Result, ensure};
-use sim::{Setting, Streams};
+use sim::{Setting, Start, Streams};
 use track::Lap;
 
 use crate::config::{Config, ModelFile};
@@ -23,6 +23,17 @@ pub(crate) struct Recording {
     pub(super) cuts: Vec<Setup>,
     /// Text of the world file.
     pub(super) world: String,
+    /// Its first run's number among those of all recordings.
+    pub(super) first_run: usize,
+}
+
+/// A run to be simulated.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct RunPlace {
+    /// Its number among those of all recordings: effects that go by run have a value for each.
+    pub(crate) number: usize,
+    /// Where it starts, if what the robot does changes in the course of a run.
+    pub(crate) start: Start,
 }
 
 impl Recording {
@@ -35,6 +46,7 @@ impl Recording {
         file: &ModelFile,
         world: Option<&Path>,
         set: DataSet,
+        first_run: usize,
     ) -> Result<Self> {
         let config = set.declared_config(&file.config)?;
         let source = file.world(world)?;
@@ -60,6 +72,7 @@ impl Recording {
             measured,
             cuts,
             world: source.text,
+            first_run,
         })
     }
 
@@ -73,24 +86,55 @@ impl Recording {
         self.measured.runs.iter().map(|run| run.laps.clone()).collect()
     }
 
-    /// One simulated data set of this one's shape; `None` where a run does not complete its laps. Its runs take the values
-    /// of effects that go by run from `first_run` on.
-    pub(super) fn simulate(
+    /// Whether the declared model does the same in every run, wherever the run starts.
+    pub(super) fn runs_are_alike(&self) -> bool {
+        self.setup.model.effects.iter().all(Setting::same_in_every_run)
+    }
+
+    /// The measured runs as places of simulated ones.
+    pub(super) fn places(&self) -> Vec<RunPlace> {
+        (self.measured.runs.iter().enumerate())
+            .map(|(i, run)| RunPlace {
+                number: self.first_run + i,
+                start: run.start(),
+            })
+            .collect()
+    }
+
+    /// One simulated data set of this one's shape; `None` where a run does not complete its laps. Runs start where the
+    /// measured ones did if what the robot does changes in the course of a run.
+    pub(super) fn simulate(&self, setup: &Setup, effects: &[Setting], seeds: Seeds) -> Option<Vec<Vec<Lap>>> {
+        let changes = (setup.model.effects.iter().chain(effects)).any(Setting::depends_on_time);
+        let starts: Vec<Start> = if changes {
+            self.places().iter().map(|place| place.start).collect()
+        } else {
+            Vec::new()
+        };
+        Self::drive(setup, effects, seeds, &self.shape(), &starts, self.first_run)
+    }
+
+    /// The same whatever was measured, unless the declared model itself changes in the course of a run.
+    pub(super) fn simulate_anywhere(
         &self,
         setup: &Setup,
         effects: &[Setting],
         seeds: Seeds,
-        first_run: usize,
     ) -> Option<Vec<Vec<Lap>>> {
-        Self::drive(setup, effects, seeds, &self.shape(), first_run)
+        if self.runs_are_alike() {
+            Self::drive(setup, effects, seeds, &self.shape(), &[], self.first_run)
+        } else {
+            self.simulate(setup, effects, seeds)
+        }
     }
 
-    /// As [`Recording::simulate`], of any shape: `laps` of each run.
+    /// One simulated data set of `laps` laps of each run, from random starts where none are given. Its runs take the values
+    /// of effects that go by run from `first_run` on.
     pub(super) fn drive(
         setup: &Setup,
         effects: &[Setting],
         seeds: Seeds,
         laps: &[usize],
+        starts: &[Start],
         first_run: usize,
     ) -> Option<Vec<Vec<Lap>>> {
         if interrupt::check().is_err() {
@@ -104,7 +148,11 @@ impl Recording {
                 seed: seeds.of_fit(),
                 run: run as u64,
             };
-            let drive = sim::drive(&world, streams, laps, |_| {}).ok()?;
+            let drive = match starts.get(run) {
+                Some(&start) => sim::drive_from(&world, streams, start, laps, |_| {}),
+                None => sim::drive(&world, streams, laps, |_| {}),
+            };
+            let drive = drive.ok()?;
             let closed: Vec<Lap> = (drive.laps.into_iter())
                 .filter(|lap| lap.missed.is_empty())
                 .collect();
@@ -134,12 +182,7 @@ pub(super) fn simulate_all(
     effects: &[Setting],
     seeds: Seeds,
 ) -> Option<Vec<Vec<Lap>>> {
-    let mut first_run = 0;
-    let parts = recordings.iter().map(|recording| {
-        let first = first_run;
-        first_run += recording.measured.runs.len();
-        recording.simulate(&recording.setup, effects, seeds, first)
-    });
+    let parts = (recordings.iter()).map(|recording| recording.simulate(&recording.setup, effects, seeds));
     Some(parts.collect::<Option<Vec<_>>>()?.concat())
 }
 

@@ -33,6 +33,8 @@ pub(super) type White = DVector<f64>;
 #[derive(Debug, Clone)]
 pub struct Atlas {
     pub(super) null: Expectation,
+    /// Whether the declared model expects the same of each run of a recording.
+    pub(super) alike: bool,
     /// Of each recording.
     pub(super) scatter: Vec<Scatter>,
     /// What each simulated data set of the declared model says.
@@ -62,16 +64,18 @@ impl Clone for Spent {
 
 impl Atlas {
     /// Simulates everything for one recording; `cuts` simulate the declared model with walls that another program may have
-    /// cut, which is no departure from it. `tick` is called after each simulated data set.
+    /// cut, which is no departure from it; `alike` says whether the declared model does the same in every run. `tick` is called
+    /// after each simulated data set.
     ///
     /// # Errors
     /// A declared model that does not complete its laps.
     pub fn new(
         simulate: &Simulate<'_>,
         cuts: &[&Simulate<'_>],
+        alike: bool,
         tick: &(dyn Fn() + Sync),
     ) -> Result<Self, Error> {
-        Self::with_probes(simulate, cuts, probes(), tick)
+        Self::with_probes(simulate, cuts, alike, probes(), tick)
     }
 
     /// An atlas that knows no effect: enough to judge laps by, not to name what they lack.
@@ -81,14 +85,16 @@ impl Atlas {
     pub fn without_effects(
         simulate: &Simulate<'_>,
         cuts: &[&Simulate<'_>],
+        alike: bool,
         tick: &(dyn Fn() + Sync),
     ) -> Result<Self, Error> {
-        Self::with_probes(simulate, cuts, Vec::new(), tick)
+        Self::with_probes(simulate, cuts, alike, Vec::new(), tick)
     }
 
     fn with_probes(
         simulate: &Simulate<'_>,
         cuts: &[&Simulate<'_>],
+        alike: bool,
         probes: Vec<Probe>,
         tick: &(dyn Fn() + Sync),
     ) -> Result<Self, Error> {
@@ -105,7 +111,7 @@ impl Atlas {
             .iter()
             .map(Vec::len)
             .collect();
-        let expectation = Expectation::of(null.iter(), true);
+        let expectation = Expectation::of(null.iter(), alike);
         let directions = directions(cuts, &null, tick);
         let mean_laps = laps.iter().sum::<usize>() as f64 / laps.len() as f64;
         let scatter = Scatter::of(null.iter().map(|summary| &summary.0[0]))
@@ -118,6 +124,7 @@ impl Atlas {
                 lap: expectation.0[0].trend.len(),
             },
             null: expectation,
+            alike,
             scatter: vec![scatter],
             probes,
             paths: Vec::new(),
@@ -138,14 +145,14 @@ impl Atlas {
             .map(|&(p, k)| {
                 let probe = &self.probes[p];
                 let setting = [probe.setting(probe.sizes[k])];
-                let same_draws = Expectation::mean(&self.samples[..probe.sets as usize], true);
+                let same_draws = self.declared_mean(probe.sets);
                 let sets: Option<Vec<Summary>> = (0..probe.sets)
                     .map(|set| {
                         tick();
                         self.summary(simulate, &setting, set)
                     })
                     .collect();
-                sets.map(|sets| self.white(&Expectation::of(sets.iter(), true), &same_draws))
+                sets.map(|sets| self.white(&Expectation::of(sets.iter(), self.alike), &same_draws))
             })
             .collect();
         let mut points = points.into_iter();
@@ -164,6 +171,7 @@ impl Atlas {
             (0..probes.len()).map(|p| (0..probes[p].sizes.len()).map(|k| joined(&parts, p, k)).collect());
         Some(Self {
             null: Expectation::join(parts.iter().map(|part| part.null.clone())),
+            alike: parts.iter().all(|part| part.alike),
             scatter: parts.iter().flat_map(|part| part.scatter.clone()).collect(),
             samples,
             layout: Layout {
@@ -181,6 +189,7 @@ impl Atlas {
         postcard::to_stdvec(&Stored {
             probes: fingerprint(&self.probes),
             null: self.null.clone(),
+            alike: self.alike,
             scatter: self.scatter.clone(),
             samples: self.samples.clone(),
             layout: self.layout.clone(),
@@ -194,6 +203,7 @@ impl Atlas {
         let Stored {
             probes: made_with,
             null,
+            alike,
             scatter,
             samples,
             layout,
@@ -206,6 +216,7 @@ impl Atlas {
         };
         (made_with == fingerprint(&probes)).then_some(Self {
             null,
+            alike,
             scatter,
             samples,
             layout,
@@ -229,6 +240,11 @@ impl Atlas {
     /// Number of data sets simulated for diagnoses, the atlas itself not counted.
     pub fn spent(&self) -> u64 {
         self.spent.0.load(Ordering::Relaxed)
+    }
+
+    /// The mean of the first so many data sets simulated of the declared model.
+    pub(super) fn declared_mean(&self, sets: u64) -> Expectation {
+        Expectation::mean(&self.samples[..sets as usize], self.alike)
     }
 
     /// Time of a lap, s: that of the first recording.
@@ -316,6 +332,7 @@ fn directions(cuts: &[&Simulate<'_>], null: &[Summary], tick: &(dyn Fn() + Sync)
 struct Stored {
     probes: String,
     null: Expectation,
+    alike: bool,
     scatter: Vec<Scatter>,
     samples: Vec<Expectation>,
     layout: Layout,

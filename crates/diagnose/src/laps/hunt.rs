@@ -150,7 +150,7 @@ impl Atlas {
         sizes: &[f64],
         sets: u64,
     ) -> Vec<(f64, f64)> {
-        let same_draws = Expectation::mean(&self.samples[..sets as usize], true);
+        let same_draws = self.declared_mean(sets);
         let others = beside.settings(self);
         let distance = |&size: &f64| {
             let mut settings = others.clone();

@@ -289,11 +289,6 @@ impl Hypothesis {
         self.parts.iter().any(|part| atlas.probes[part.probe].has_place())
     }
 
-    /// Whether all runs are alike.
-    pub(super) fn alike(&self) -> bool {
-        self.parts.iter().all(|part| part.shape != Shape::ByRun)
-    }
-
     /// A single constant effect with a size that goes over the runs or in time, from the same size; `None` for others.
     pub(super) fn over(&self, shape: Shape, atlas: &Atlas) -> Option<Self> {
         let [part] = self.parts.as_slice() else {

@@ -61,10 +61,7 @@ impl Probe {
 
     /// Whether the effect itself is a change in time.
     pub(super) fn drifts(&self) -> bool {
-        self.spec
-            .params
-            .get(self.size_index())
-            .is_some_and(|param| param.name == "per_s")
+        self.spec.drifts()
     }
 
     /// Which parameter sizes it.

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use rayon::prelude::*;
-use sim::{Pattern, Setting};
+use sim::Setting;
 
 use super::atlas::{Atlas, Simulate, White};
 use super::expectation::Expectation;
@@ -41,7 +41,7 @@ impl Atlas {
         numbers: &[(usize, usize)],
         sets: u64,
     ) -> Vec<Option<White>> {
-        let same_draws = Expectation::mean(&self.samples[..sets as usize], true);
+        let same_draws = self.declared_mean(sets);
         numbers
             .par_iter()
             .map(|&(probe, number)| {
@@ -60,7 +60,7 @@ impl Atlas {
         sets: u64,
     ) -> Option<Expectation> {
         let summaries = self.summaries(simulate, settings, 0..sets)?;
-        Some(Expectation::of(summaries.iter(), true))
+        Some(Expectation::of(summaries.iter(), self.alike))
     }
 
     /// What effects leave of the data, in units of their own scatter; `None` where the robot crashes.
@@ -70,8 +70,7 @@ impl Atlas {
         data: &Expectation,
         effects: &[Setting],
     ) -> Option<White> {
-        let alike = !effects.iter().any(|e| matches!(e.pattern, Pattern::ByRun(_)));
-        let end = self.simulated(simulate, effects, alike, self.enough(FINAL_SETS, 1))?;
+        let end = self.simulated(simulate, effects, self.enough(FINAL_SETS, 1))?;
         Some(self.fit(data, &end)?.residual)
     }
 
@@ -82,7 +81,7 @@ impl Atlas {
         hypothesis: &Hypothesis,
         sets: u64,
     ) -> Option<Evaluated> {
-        self.simulated(simulate, &hypothesis.settings(self), hypothesis.alike(), sets)
+        self.simulated(simulate, &hypothesis.settings(self), sets)
     }
 
     /// The same with data sets added until there are so many.
@@ -96,16 +95,11 @@ impl Atlas {
         let mut summaries = evaluated.summaries;
         let done = summaries.len() as u64;
         summaries.extend(self.summaries(simulate, &hypothesis.settings(self), done..sets.max(done))?);
-        Some(self.evaluated(summaries, hypothesis.alike()))
+        Some(self.evaluated(summaries, evaluated.doubt.alike))
     }
 
-    fn simulated(
-        &self,
-        simulate: &Simulate<'_>,
-        settings: &[Setting],
-        alike: bool,
-        sets: u64,
-    ) -> Option<Evaluated> {
+    fn simulated(&self, simulate: &Simulate<'_>, settings: &[Setting], sets: u64) -> Option<Evaluated> {
+        let alike = self.alike && settings.iter().all(Setting::same_in_every_run);
         let summaries = self.summaries(simulate, settings, 0..sets)?;
         Some(self.evaluated(summaries, alike))
     }

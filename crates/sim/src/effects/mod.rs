@@ -175,6 +175,13 @@ pub struct Spec {
     pub build: fn() -> Box<dyn Effect>,
 }
 
+impl Spec {
+    /// Whether its one parameter is a rate of change in the course of a run.
+    pub fn drifts(&self) -> bool {
+        matches!(self.params, [Param { name: "per_s", .. }])
+    }
+}
+
 impl PartialEq for Spec {
     fn eq(&self, other: &Self) -> bool {
         self.name == other.name

@@ -1,6 +1,7 @@
 //! An effect with the values of its parameters, constant, by run or by time.
 
-use super::{EFFECTS, Effect, Param, Spec};
+use super::unlisted::unlisted_depends_on_time;
+use super::{EFFECTS, Effect, Param, Spec, UNLISTED};
 use crate::Error;
 use crate::sensor::check;
 
@@ -80,6 +81,22 @@ impl Setting {
                 })
             }
         }
+    }
+
+    /// Whether what it does changes in the course of a run: where the run starts then tells in every lap.
+    pub fn depends_on_time(&self) -> bool {
+        let unlisted = |values: &Vec<f64>| *self.spec == UNLISTED && unlisted_depends_on_time(values);
+        self.spec.drifts()
+            || match &self.pattern {
+                Pattern::Constant(values) => unlisted(values),
+                Pattern::ByRun(runs) => runs.iter().any(unlisted),
+                Pattern::ByTime { .. } => true,
+            }
+    }
+
+    /// Whether it does the same in every run, wherever the run starts.
+    pub fn same_in_every_run(&self) -> bool {
+        !matches!(self.pattern, Pattern::ByRun(_)) && !self.depends_on_time()
     }
 
     /// The parameter of each value, for ever where the last is a list.

@@ -89,6 +89,10 @@ pub fn unlisted_on_floor(values: &[f64], from_middle: Vec2) -> f64 {
     on_floor(&values[WORDS..], from_middle)
 }
 
+pub(super) fn unlisted_depends_on_time(values: &[f64]) -> bool {
+    word(&DEPENDS_ON, values[1]) == "time"
+}
+
 fn harmonics(coefficients: &[f64], u: f64) -> f64 {
     let term = |(k, pair): (usize, &[f64])| {
         let (sin, cos) = ((k + 1) as f64 * u).sin_cos();
