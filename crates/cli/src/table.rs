@@ -121,9 +121,38 @@ pub(crate) fn probability(p: f64) -> String {
     }
 }
 
+/// A number with four significant digits, trailing zeros left out.
+pub(crate) fn four_digits(x: f64) -> String {
+    format!("{x:.3e}")
+        .parse::<f64>()
+        .map_or(String::new(), |x| format!("{x}"))
+}
+
+/// A number with its standard error, which has two significant digits.
+pub(crate) fn with_error(value: f64, error: f64) -> String {
+    // Rounded first: 0.0996 has its second digit where 0.10 has.
+    let power = format!("{error:.1e}")
+        .split_once('e')
+        .and_then(|(_, power)| power.parse().ok())
+        .unwrap_or(0);
+    let decimals = usize::try_from(1 - power).unwrap_or(0);
+    format!("{value:.decimals$} ± {error:.decimals$}")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn errors_have_two_digits_and_values_as_many_as_their_errors() {
+        assert_eq!(with_error(1.5e-4, 1.1e-6), "0.0001500 ± 0.0000011");
+        assert_eq!(with_error(-0.078_04, 0.002_24), "-0.0780 ± 0.0022");
+        assert_eq!(with_error(37.66, 1.249), "37.7 ± 1.2");
+        assert_eq!(with_error(1234.5, 0.0996), "1234.50 ± 0.10");
+        assert_eq!(with_error(1234.5, 123.0), "1234 ± 123");
+        assert_eq!(four_digits(0.063_514_8), "0.06351");
+        assert_eq!(four_digits(-2.0), "-2");
+    }
 
     #[test]
     fn text_is_aligned_and_html_escaped() {

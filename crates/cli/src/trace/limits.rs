@@ -7,7 +7,7 @@ use diagnose::{Decided, Detectable};
 use super::Trace;
 use super::next::Experiment;
 use crate::experiments::Block;
-use crate::table::{Table, probability};
+use crate::table::{Table, four_digits, probability};
 
 /// The next experiment in a sentence; `None` where nothing has to be told apart.
 pub(crate) fn next_in_words(trace: &Trace) -> Option<String> {
@@ -107,15 +107,10 @@ fn range(all: &[&Detectable], of: &dyn Fn(&Detectable) -> Option<f64>, falling: 
     } else {
         ""
     };
-    let one = |x: f64| {
-        format!("{x:.3e}")
-            .parse::<f64>()
-            .map_or(String::new(), |x| format!("{x}"))
-    };
     Some(if sizes.len() == 1 {
-        format!("{}{hidden}", one(*first))
+        format!("{}{hidden}", four_digits(*first))
     } else {
-        format!("{} to {}{hidden}", one(*first), one(*last))
+        format!("{} to {}{hidden}", four_digits(*first), four_digits(*last))
     })
 }
 

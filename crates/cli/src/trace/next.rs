@@ -220,14 +220,7 @@ fn logs(setup: &Setup, effects: &[Setting], seed: u64) -> Option<Vec<Vec<LogRow>
             run: run as u64,
         };
         let mut rows = Vec::new();
-        let record = |step: &Step| {
-            rows.push(LogRow {
-                time_s: step.time_s,
-                observed: Some(step.observed),
-                readings: step.readings,
-                command: step.command,
-            });
-        };
+        let record = |step: &Step| rows.push(LogRow::from(*step));
         let drive = sim::drive(&world, streams, LOGGED_LAPS, record).ok()?;
         (drive.laps.len() == LOGGED_LAPS).then_some(rows)
     };

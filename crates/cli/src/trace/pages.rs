@@ -12,7 +12,7 @@ use super::{MeanLaps, Trace, mean};
 use crate::experiments::{Block, Picture, Section};
 use crate::figures::{MM, across, crossings, line, map, single, walls};
 use crate::laps::SampledRun;
-use crate::table::{Table, probability};
+use crate::table::{Table, four_digits, probability, with_error};
 
 /// The sections of a trace.
 ///
@@ -148,13 +148,29 @@ pub(crate) fn gates_csv(trace: &Trace) -> String {
 /// An effect with its size, for a sentence.
 fn describe(effect: &diagnose::Candidate) -> String {
     let params = effect.setting.spec.params;
+    let number = |value: f64, error: f64| {
+        if error > 0.0 {
+            with_error(value, error)
+        } else {
+            four_digits(value)
+        }
+    };
     let list = |values: &[f64], errors: &[f64]| {
         let one = |(i, p): (usize, &sim::Param)| match p.choices.get(values[i] as usize) {
             Some(choice) => format!("{} {choice}", p.name),
-            None if errors[i] > 0.0 => format!("{} {:.4} ± {:.4}", p.name, values[i], errors[i]),
-            None => format!("{} {:.4}", p.name, values[i]),
+            None => format!("{} {}", p.name, number(values[i], errors[i])),
         };
         params.iter().enumerate().map(one).collect::<Vec<_>>().join(", ")
+    };
+    let changes = |per_s: &[f64], errors: &[f64]| {
+        let changing = params
+            .iter()
+            .zip(per_s)
+            .zip(errors)
+            .filter(|((_, slope), _)| **slope != 0.0);
+        changing
+            .map(|((p, slope), error)| format!("; {} changes by {} per s", p.name, number(*slope, *error)))
+            .collect::<String>()
     };
     let name = effect.setting.spec.name;
     if let Some(cause) = Cause::of(&effect.setting) {
@@ -165,9 +181,10 @@ fn describe(effect: &diagnose::Candidate) -> String {
     }
     match &effect.setting.pattern {
         Pattern::Constant(values) => format!("{name} ({})", list(values, &effect.standard_errors)),
-        Pattern::ByTime { start, .. } => format!(
-            "{name} changing in time ({} at the start)",
-            list(start, &effect.standard_errors)
+        Pattern::ByTime { start, per_s } => format!(
+            "{name} changing in time ({} at the start{})",
+            list(start, &effect.standard_errors),
+            changes(per_s, &effect.standard_errors[params.len()..])
         ),
         Pattern::ByRun(runs) => {
             let count = params.len();

@@ -10,10 +10,11 @@ use super::catalogue::{Variant, unlisted_variants, variants};
 use super::decide::{Decided, decided};
 use super::evidence::Evidence;
 use super::filter::{MEASURED, Trace};
-use super::noise::{Factor, noises};
+use super::noise::{Factor, noises, with_honest_error};
 use super::pairs::pairs;
 use super::recut::recut;
 use super::refine::jumps;
+use super::repeat::repeats;
 use super::rows::LogRow;
 use super::screen::normals;
 use super::search::{By, Lead, Refined, leads, price, pursue, shortlist, tail, together};
@@ -279,6 +280,9 @@ impl<'a> Search<'a> {
         self.second(leads);
         self.sort();
         self.judge();
+        if let (Some(best), None) = (self.found.first_mut(), self.step) {
+            *best = with_honest_error(&self.evidence, best.clone());
+        }
     }
 
     fn sort(&mut self) {
@@ -287,8 +291,9 @@ impl<'a> Search<'a> {
 
     /// A noise effect is a candidate only where nothing with a mean is left once it is fitted.
     fn accept_noise(&mut self, noise: Vec<Factor>) {
-        /// Log-likelihood that a column may still gain then.
+        /// Log-likelihood that a column may still gain then: twice what it usually does at small noise.
         const LEFT: f64 = 14.0;
+        const TIMES: f64 = 2.0;
         /// Share of the best score by which a gain known to a tenth may fall short of it.
         const NEAR: f64 = 0.8;
         let best = self.found.first().map_or(0.0, Refined::score);
@@ -303,10 +308,22 @@ impl<'a> Search<'a> {
             let left = self
                 .screen(&one.settings)
                 .map_or(f64::INFINITY, |found| most(&found.1));
-            if left < LEFT {
+            if left < LEFT || left < TIMES * self.usually_left(&one) {
                 self.found.push(one);
             }
         }
+    }
+
+    /// What a column gains at most beside a noise effect in logs that have this effect alone: at large noise the filter is not
+    /// linear enough to leave nothing.
+    fn usually_left(&self, noise: &Refined) -> f64 {
+        let left = |repeated: &Evidence<'_>| {
+            let traces = repeated.traces(&noise.settings)?;
+            let normals = normals(&traces, &self.variants).ok()?;
+            Some(most(&leads(repeated, &self.variants, &normals)))
+        };
+        let all = repeats(&self.evidence, &noise.settings, left);
+        all.into_iter().fold(0.0, f64::max)
     }
 
     /// Looks for a second effect beside the best one, and for the best pairs.
@@ -418,7 +435,7 @@ impl<'a> Search<'a> {
             self.unlisted = self.characterise(gain);
         }
         if self.unlisted.is_none() {
-            self.unlisted = self.rough();
+            self.unlisted = rough(&self.channels);
         }
     }
 
@@ -441,32 +458,6 @@ impl<'a> Search<'a> {
         Cause::of(&refined.settings[0]).map(|cause| Unnamed {
             cause,
             refined: Some(refined),
-        })
-    }
-
-    /// Noise that no normal distribution has: innovations with heavy tails that are no edges of readings.
-    fn rough(&self) -> Option<Unnamed> {
-        let heavy = |channel: &Channel| {
-            let deviation = (24.0 / channel.count.max(1) as f64).sqrt();
-            channel.kurtosis > 3.3 && channel.kurtosis - 3.0 > 10.0 * deviation
-        };
-        let camera = self.channels[..2].iter().any(heavy);
-        let readings = self.channels[2..].iter().filter(|channel| heavy(channel)).count();
-        if !camera && readings == 0 {
-            return None;
-        }
-        let (stage, acts_on) = match (camera, readings) {
-            (true, 0) => (Stage::Observe, "camera"),
-            (false, 1 | 2) => (Stage::Sense, "reading"),
-            _ => (Stage::Act, "wheel speed"),
-        };
-        Some(Unnamed {
-            cause: Cause {
-                stage,
-                acts_on: acts_on.into(),
-                depends_on: "chance".into(),
-            },
-            refined: None,
         })
     }
 
@@ -614,6 +605,32 @@ fn with_mean_of_others(values: &[Vec<f64>], run: usize) -> Vec<Vec<f64>> {
 struct Unnamed {
     cause: Cause,
     refined: Option<Refined>,
+}
+
+/// Noise that no normal distribution has: innovations with heavy tails that are no edges of readings.
+fn rough(channels: &[Channel; MEASURED]) -> Option<Unnamed> {
+    let heavy = |channel: &Channel| {
+        let deviation = (24.0 / channel.count.max(1) as f64).sqrt();
+        channel.kurtosis > 3.3 && channel.kurtosis - 3.0 > 10.0 * deviation
+    };
+    let camera = channels[..2].iter().any(heavy);
+    let readings = channels[2..].iter().filter(|channel| heavy(channel)).count();
+    if !camera && readings == 0 {
+        return None;
+    }
+    let (stage, acts_on) = match (camera, readings) {
+        (true, 0) => (Stage::Observe, "camera"),
+        (false, 1 | 2) => (Stage::Sense, "reading"),
+        _ => (Stage::Act, "wheel speed"),
+    };
+    Some(Unnamed {
+        cause: Cause {
+            stage,
+            acts_on: acts_on.into(),
+            depends_on: "chance".into(),
+        },
+        refined: None,
+    })
 }
 
 /// The best score.

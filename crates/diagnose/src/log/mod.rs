@@ -16,6 +16,7 @@ mod noise;
 mod pairs;
 mod recut;
 mod refine;
+mod repeat;
 mod rows;
 mod screen;
 mod search;

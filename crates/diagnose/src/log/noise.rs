@@ -2,10 +2,14 @@
 
 use std::ops::ControlFlow;
 
-use sim::{Setting, Spec, find};
+use sim::{Pattern, Setting, Spec, find};
 
 use super::evidence::Evidence;
+use super::repeat::repeats;
 use super::search::{By, Refined};
+
+/// The effects on noise.
+const NOISES: [&str; 3] = ["slip-level", "camera-noise", "reading-noise"];
 
 /// A noise effect's factor beside other settings: how far its best value is known.
 #[derive(Debug, Clone)]
@@ -27,8 +31,7 @@ const ROUNDS: usize = 12;
 /// The noise effects that gain something beside `settings`, whose log-likelihood is `base`: the gain to about a tenth.
 pub(crate) fn noises(evidence: &Evidence<'_>, settings: &[Setting], base: f64) -> Vec<Factor> {
     const FAIR: f64 = 0.1;
-    ["slip-level", "camera-noise", "reading-noise"]
-        .into_iter()
+    (NOISES.into_iter())
         .filter(|name| settings.iter().all(|setting| setting.spec.name != *name))
         .filter_map(|name| {
             let mut factor = Factor {
@@ -95,6 +98,16 @@ impl Factor {
         })
     }
 
+    /// At its best.
+    fn best(mut self, evidence: &Evidence<'_>, settings: &[Setting], base: f64) -> Option<Self> {
+        for _ in 0..ROUNDS {
+            if self.round(evidence, settings, base)?.is_break() {
+                break;
+            }
+        }
+        Some(self)
+    }
+
     /// The settings with the best factor and its error.
     pub(crate) fn refined(
         mut self,
@@ -105,11 +118,7 @@ impl Factor {
         /// Logarithm of the factor to either side over which the log-likelihood's curvature tells the error: it is rough at
         /// a smaller scale, as readings come and go at edges.
         const WIDE: f64 = 0.08;
-        for _ in 0..ROUNDS {
-            if self.round(evidence, settings, base)?.is_break() {
-                break;
-            }
-        }
+        self = self.best(evidence, settings, base)?;
         let at = |log: f64| Some(self.at(evidence, settings, log)? - base);
         let (low, high) = (at(self.middle - WIDE)?, at(self.middle + WIDE)?);
         let bend = (high - 2.0 * self.gain + low) / (WIDE * WIDE);
@@ -121,4 +130,36 @@ impl Factor {
             by: By::Constant,
         })
     }
+}
+
+/// The same with the error of its noise effect's factor, if it has one, as large as fits to simulated logs of the answer
+/// scatter (a parametric bootstrap; Efron and Tibshirani 1993). Large noise takes the robot far from the pose about which the
+/// filter is linear: its innovations have heavy tails, and the likelihood is sharper than it should be.
+pub(crate) fn with_honest_error(evidence: &Evidence<'_>, mut refined: Refined) -> Refined {
+    let is_noise = |setting: &Setting| NOISES.contains(&setting.spec.name);
+    let Some(place) = refined.settings.iter().position(is_noise) else {
+        return refined;
+    };
+    let mut others = refined.settings.clone();
+    let noise = others.remove(place);
+    let Pattern::Constant(values) = &noise.pattern else {
+        return refined;
+    };
+    let middle = values[0].ln();
+    let off = repeats(evidence, &refined.settings, |repeated| {
+        let base = repeated.likelihood(&others)?;
+        let start = Factor {
+            spec: noise.spec,
+            gain: repeated.likelihood(&refined.settings)? - base,
+            middle,
+            half: 0.08,
+        };
+        Some(start.best(repeated, &others, base)?.middle - middle)
+    });
+    if !off.is_empty() {
+        let square = off.iter().map(|off| off * off).sum::<f64>() / off.len() as f64;
+        let error = &mut refined.standard_errors[place][0];
+        *error = error.max(values[0] * square.sqrt());
+    }
+    refined
 }

@@ -1,6 +1,6 @@
 //! What a robot and the camera above it have written down.
 
-use sim::{Pose, Readings, Robot, RunRules, Vec2, WheelSpeeds};
+use sim::{Pose, Readings, Robot, RunRules, Step, Vec2, WheelSpeeds};
 
 /// One control step of a run's file.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -13,6 +13,17 @@ pub struct LogRow {
     pub readings: Readings,
     /// The wheel speeds that it commanded, m/s; NaN where they are missing.
     pub command: WheelSpeeds,
+}
+
+impl From<Step> for LogRow {
+    fn from(step: Step) -> Self {
+        Self {
+            time_s: step.time_s,
+            observed: Some(step.observed),
+            readings: step.readings,
+            command: step.command,
+        }
+    }
 }
 
 impl LogRow {

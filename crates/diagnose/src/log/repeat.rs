@@ -1,0 +1,42 @@
+//! Logs simulated of an answer: what becomes of them tells what to make of the measured ones.
+
+use rayon::prelude::*;
+use sim::{Run, Setting, Streams};
+
+use super::evidence::Evidence;
+use super::rows::LogRow;
+
+/// What `of` makes of logs of robots with these effects, eight times as many as were measured.
+pub(crate) fn repeats<R: Send>(
+    evidence: &Evidence<'_>,
+    settings: &[Setting],
+    of: impl Fn(&Evidence<'_>) -> Option<R> + Sync,
+) -> Vec<R> {
+    const REPEATS: u64 = 8;
+    let one = |repeat: u64| {
+        let logs = simulated(evidence, settings, repeat)?;
+        let runs: Vec<&[LogRow]> = logs.iter().map(Vec::as_slice).collect();
+        of(&Evidence::new(evidence.scene, evidence.model, &runs, 0.0).ok()?)
+    };
+    (0..REPEATS).into_par_iter().filter_map(one).collect()
+}
+
+/// One log for each run, as long as what was used of the measured one.
+fn simulated(evidence: &Evidence<'_>, settings: &[Setting], repeat: u64) -> Option<Vec<Vec<LogRow>>> {
+    const SEED: u64 = 1 << 52;
+    let log_of = |run: usize| {
+        let own = evidence.stretches.iter().filter(|stretch| stretch.run == run);
+        let count: usize = own.map(|stretch| stretch.rows.len()).sum();
+        if count == 0 {
+            return Some(Vec::new());
+        }
+        let world = evidence.world(settings, run).ok()?;
+        let streams = Streams {
+            seed: SEED + repeat,
+            run: run as u64,
+        };
+        let mut drive = Run::new(&world, streams).ok()?;
+        Some((0..count).map(|_| LogRow::from(drive.step())).collect())
+    };
+    (0..=*evidence.runs().last()?).map(log_of).collect()
+}
