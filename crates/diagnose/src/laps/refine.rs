@@ -196,10 +196,11 @@ impl Atlas {
         let fit = self.fit_of(data, left, scatter, center.doubt);
         let gain = if round == Round::Rough {
             fit.gain + fit.lost_to_doubt
+                - 0.5 * (self.least_left(&hypothesis) - fit.residual.norm_squared()).max(0.0)
         } else {
             let sets = self.enough(round.sets(), 1);
             let center = self.evaluate_more(simulate, &hypothesis, center.clone(), sets)?;
-            self.likely_gain(data, &center)? + hoped
+            self.likely_gain(data, &hypothesis, &center, hoped)?
         };
         let hypothesis = self.with_moves(&hypothesis, &freedoms, &moves);
         let found = full && is_settled(&moves, &covariance, &freedoms);
@@ -255,7 +256,7 @@ impl Atlas {
             hoped,
         } = self.nearest(data, &center, &local.scatter, &columns, &freedoms);
         let fit = self.fit_of(data, left, &local.scatter, center.doubt);
-        let gain = self.likely_gain(data, &center)? + hoped;
+        let gain = self.likely_gain(data, &descent.hypothesis, &center, hoped)?;
         let found = full && is_settled(&moves, &covariance, &freedoms);
         let remainder = Some(FourNumbers::new(&fit.residual, &self.layout));
         let at_rest =
@@ -282,11 +283,33 @@ impl Atlas {
         })
     }
 
-    /// The log-likelihood gained by a simulated hypothesis, with what the simulation's own error is expected to cost added
-    /// back: rounds simulate more or less often.
-    fn likely_gain(&self, data: &Expectation, simulated: &Evaluated) -> Option<f64> {
+    /// The log-likelihood gained by a simulated hypothesis once its numbers have moved, which is hoped to gain so much more: never
+    /// so much that less would be left than chance leaves. What the simulation's own error is expected to cost is added back:
+    /// rounds simulate more or less often.
+    fn likely_gain(
+        &self,
+        data: &Expectation,
+        hypothesis: &Hypothesis,
+        simulated: &Evaluated,
+        hoped: f64,
+    ) -> Option<f64> {
         let fit = self.fit(data, simulated)?;
-        Some(fit.gain + fit.lost_to_doubt)
+        let most = 0.5 * (fit.residual.norm_squared() - self.least_left(hypothesis));
+        Some(fit.gain + fit.lost_to_doubt + hoped.min(most.max(0.0)))
+    }
+
+    /// The least sum of squares that a hypothesis may be hoped to leave of data: what chance leaves in the luckiest case, and in
+    /// the mean where sizes jump, of which parabolas promise anything.
+    fn least_left(&self, hypothesis: &Hypothesis) -> f64 {
+        const DEVIATIONS: f64 = 4.0;
+        let count = self.layout.len() as f64;
+        let jumps = (hypothesis.parts.iter()).any(|part| self.probes[part.probe].jumps);
+        count
+            - if jumps {
+                0.0
+            } else {
+                DEVIATIONS * (2.0 * count).sqrt()
+            }
     }
 
     pub(super) fn with_moves(
