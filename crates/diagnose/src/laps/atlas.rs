@@ -244,7 +244,8 @@ impl Atlas {
 
     /// The mean of the first so many data sets simulated of the declared model.
     pub(super) fn declared_mean(&self, sets: u64) -> Expectation {
-        Expectation::mean(&self.samples[..sets as usize], self.alike)
+        let samples: Vec<&Expectation> = self.samples[..sets as usize].iter().collect();
+        Expectation::mean(&samples, self.alike)
     }
 
     /// Time of a lap, s: that of the first recording.

@@ -32,9 +32,9 @@ impl Expectation {
     }
 
     /// The mean of several expectations of the same shape.
-    pub(super) fn mean(all: &[Self], alike: bool) -> Self {
+    pub(super) fn mean(all: &[&Self], alike: bool) -> Self {
         let share = 1.0 / all.len() as f64;
-        let zero = all[0].moved(-1.0, &all[0].zero(), &all[0]);
+        let zero = all[0].moved(-1.0, &all[0].zero(), all[0]);
         let mut mean = all
             .iter()
             .fold(zero, |mean, one| mean.moved(share, &one.zero(), one));
