@@ -60,9 +60,11 @@ pub(crate) fn from_logs(
     let mut logs = diagnose_logs(&setup.model, &setup.scene, &runs)?;
     spread(&mut logs.answer, &logged, laps.len());
     let (before, after) = atlas.confirm(simulate, laps, &logs.answer.settings())?;
-    let confirmed = after.is_some_and(|after| {
-        after.omnibus_p() >= CONTRADICTS_P || after.excess() < (1.0 - CONFIRMED_SHARE) * before.excess()
-    });
+    // Where the logs claim nothing there is nothing to agree with.
+    let confirmed = logs.answer.verdict == Verdict::Unexplained
+        || after.is_some_and(|after| {
+            after.omnibus_p() >= CONTRADICTS_P || after.excess() < (1.0 - CONFIRMED_SHARE) * before.excess()
+        });
     Ok(FromLogs {
         logs,
         before,

@@ -280,7 +280,7 @@ impl<'a> Search<'a> {
         self.second(leads);
         self.sort();
         self.judge();
-        if let (Some(best), None) = (self.found.first_mut(), self.step) {
+        if let (Some(best), None, None) = (self.found.first_mut(), self.step, &self.unlisted) {
             *best = with_honest_error(&self.evidence, best.clone());
         }
     }
@@ -435,7 +435,7 @@ impl<'a> Search<'a> {
             self.unlisted = self.characterise(gain);
         }
         if self.unlisted.is_none() {
-            self.unlisted = rough(&self.channels);
+            self.unlisted = rough(&self.channels).filter(|_| !self.is_rough_by_itself());
         }
     }
 
@@ -459,6 +459,24 @@ impl<'a> Search<'a> {
             cause,
             refined: Some(refined),
         })
+    }
+
+    /// Whether the filter finds tails about as heavy in simulated logs of the best explanation: where rounding or large noise
+    /// takes the robot far from the pose about which it is linear.
+    fn is_rough_by_itself(&self) -> bool {
+        /// Excess kurtosis, as a multiple of the largest in simulated logs, that is no chance.
+        const TIMES: f64 = 1.5;
+        let Some(best) = self.found.first() else {
+            return false;
+        };
+        let heaviest = |channels: &[Channel; MEASURED]| {
+            let excess = channels.iter().map(|channel| channel.kurtosis - 3.0);
+            excess.fold(0.0, f64::max)
+        };
+        let simulated = repeats(&self.evidence, &best.settings, |repeated| {
+            Some(heaviest(&channels(&repeated.traces(&best.settings)?)))
+        });
+        heaviest(&self.channels) < TIMES * simulated.into_iter().fold(0.0, f64::max)
     }
 
     fn answer(self, decide: Decided, corners: Corners) -> LogDiagnosis {
