@@ -294,6 +294,7 @@ impl<'a> Search<'a> {
         /// Log-likelihood that a column may still gain then: twice what it usually does at small noise.
         const LEFT: f64 = 14.0;
         const TIMES: f64 = 2.0;
+        const HOPELESS: f64 = 10.0;
         /// Share of the best score by which a gain known to a tenth may fall short of it.
         const NEAR: f64 = 0.8;
         let best = self.found.first().map_or(0.0, Refined::score);
@@ -308,7 +309,7 @@ impl<'a> Search<'a> {
             let left = self
                 .screen(&one.settings)
                 .map_or(f64::INFINITY, |found| most(&found.1));
-            if left < LEFT || left < TIMES * self.usually_left(&one) {
+            if left < LEFT || left < HOPELESS * LEFT && left < TIMES * self.usually_left(&one) {
                 self.found.push(one);
             }
         }
