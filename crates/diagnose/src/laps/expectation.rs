@@ -126,16 +126,21 @@ impl Scatter {
     /// The scatter within the runs of simulated recordings, and of their second-order numbers between recordings; `None` if
     /// there are too few for the number of coordinates.
     pub(super) fn of<'a>(recordings: impl Iterator<Item = &'a Recording> + Clone) -> Option<Self> {
-        let all: Vec<&Recording> = recordings.clone().collect();
-        let second = covariance_of_second(&all, 1);
-        let spread = inflation(all.len() as f64 - 1.0, SECOND)?;
+        let sets = recordings.clone().count();
+        let mean = Expected::of(recordings.clone(), true).second;
+        let mut second = DMatrix::zeros(SECOND, SECOND);
+        for recording in recordings.clone() {
+            let deviation = &recording.second - &mean;
+            second.ger(1.0 / (sets as f64 - 1.0), &deviation, &deviation, 1.0);
+        }
+        let spread = inflation(sets as f64 - 1.0, SECOND)?;
         Self::of_second(recordings, second * spread)
     }
 
     /// As [`Scatter::of`] from few recordings: the second-order numbers are taken to be independent of each other.
     pub(super) fn of_few<'a>(recordings: impl Iterator<Item = &'a Recording> + Clone) -> Option<Self> {
         let all: Vec<&Recording> = recordings.clone().collect();
-        let variances = covariance_of_second(&all, 1).diagonal();
+        let variances = variances_of_second(&all, 1);
         Self::of_second(recordings, DMatrix::from_diagonal(&variances))
     }
 
@@ -180,14 +185,10 @@ impl Scatter {
         other.blended(own, freedom, target, share, second)
     }
 
-    /// The covariance of the second-order numbers of these recordings. Its variances are this scatter's as far as chance explains
-    /// how theirs differ, and the covariance of theirs is drawn towards this scatter's with those variances likewise.
+    /// The covariance of the second-order numbers of these recordings: this one's with variances that are theirs as far as
+    /// chance does not explain how they differ.
     fn second_near(&self, recordings: &[&Recording], copies: usize) -> Option<Cholesky<f64, Dyn>> {
         let sets = recordings.len() / copies;
-        /// Degrees of freedom of the declared model's.
-        const WELL_KNOWN: f64 = 199.0;
-        /// Degrees of freedom with which a covariance can be inverted: its inverse is twice too large.
-        const ENOUGH: f64 = (2 * SECOND + 2) as f64;
         if sets < 3 {
             return Some(self.second.clone());
         }
@@ -195,8 +196,7 @@ impl Scatter {
         let l = self.second.l();
         let others = &l * l.transpose();
         let bias = digamma(freedom / 2.0) - (freedom / 2.0).ln();
-        let theirs = covariance_of_second(recordings, copies);
-        let apart = (theirs.diagonal())
+        let apart = variances_of_second(recordings, copies)
             .component_div(&others.diagonal())
             .map(|ratio| ratio.ln() - bias);
         let by_chance = SECOND as f64 * variance_of_log(freedom);
@@ -205,12 +205,7 @@ impl Scatter {
         let wider = own * own * 2.0 / freedom;
         let factors = apart.map(|apart| (0.5 * (own * apart + wider)).exp());
         let root = DMatrix::from_diagonal(&factors) * l;
-        let target = &root * root.transpose();
-        let least = 1.0 - (freedom / ENOUGH).sqrt();
-        let share = share_of_target(&theirs, freedom, &target)?.max(least);
-        let known = ((1.0 - share).powi(2) / freedom + share.powi(2) / WELL_KNOWN).recip();
-        let wider = inflation(known, SECOND)? / inflation(WELL_KNOWN, SECOND)?;
-        (theirs * ((1.0 - share) * wider) + target * (share * wider)).cholesky()
+        (&root * root.transpose()).cholesky()
     }
 
     /// The scatter of the laps of these recordings drawn towards this one, as far as chance explains the difference.
@@ -219,8 +214,14 @@ impl Scatter {
         recordings: impl Iterator<Item = &'a Recording> + Clone,
     ) -> Option<Self> {
         let (own, freedom) = pooled(recordings, self.open.nrows());
+        let size = own.nrows();
         let common = self.of_lap();
-        let share = share_of_target(&own, freedom, &common)?;
+        let root = common.clone().cholesky()?;
+        let mut apart = &own - &common;
+        root.l_dirty().solve_lower_triangular_mut(&mut apart);
+        apart.transpose_mut();
+        root.l_dirty().solve_lower_triangular_mut(&mut apart);
+        let share = share_by_chance(apart.norm_squared(), freedom, size);
         if share == 1.0 {
             return Some(self.clone());
         }
@@ -330,24 +331,19 @@ fn pooled<'a>(recordings: impl Iterator<Item = &'a Recording>, size: usize) -> (
     (lap / freedom, freedom)
 }
 
-/// Covariance of the second-order numbers between recordings; of copies, one after the other, each about its own mean.
-fn covariance_of_second(recordings: &[&Recording], copies: usize) -> DMatrix<f64> {
+/// Variances of the second-order numbers between recordings; of copies, one after the other, each about its own mean.
+fn variances_of_second(recordings: &[&Recording], copies: usize) -> DVector<f64> {
     let sets = recordings.len() / copies;
-    let mut covariance = DMatrix::zeros(SECOND, SECOND);
+    let mut variances = DVector::zeros(SECOND);
     for copy in recordings.chunks(sets) {
         let sum: DVector<f64> = copy.iter().map(|recording| &recording.second).sum();
         let mean = sum / sets as f64;
         for recording in copy {
             let deviation = &recording.second - &mean;
-            covariance.ger(
-                1.0 / ((sets - 1) as f64 * copies as f64),
-                &deviation,
-                &deviation,
-                1.0,
-            );
+            variances += deviation.component_mul(&deviation) / ((sets - 1) as f64 * copies as f64);
         }
     }
-    covariance
+    variances
 }
 
 /// The principal axes of a covariance, the longest first.
@@ -374,16 +370,6 @@ fn smoothed(ratios: &DVector<f64>) -> DVector<f64> {
 fn share_by_chance(apart: f64, freedom: f64, size: usize) -> f64 {
     let by_chance = (size * (size + 1)) as f64 / freedom;
     (by_chance / apart).min(1.0)
-}
-
-/// Share of a target in the best blend with a covariance estimated with `freedom` degrees of freedom (Ledoit and Wolf 2004).
-fn share_of_target(own: &DMatrix<f64>, freedom: f64, target: &DMatrix<f64>) -> Option<f64> {
-    let root = target.clone().cholesky()?;
-    let mut apart = own - target;
-    root.l_dirty().solve_lower_triangular_mut(&mut apart);
-    apart.transpose_mut();
-    root.l_dirty().solve_lower_triangular_mut(&mut apart);
-    Some(share_by_chance(apart.norm_squared(), freedom, own.nrows()))
 }
 
 /// What makes the inverse of a covariance estimated with `freedom` degrees of freedom in `size` dimensions unbiased (the mean
