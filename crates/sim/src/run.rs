@@ -54,19 +54,15 @@ impl<'w> Run<'w> {
     /// # Errors
     /// An effect without values for this run.
     pub fn new(world: &'w World<'w>, streams: Streams) -> Result<Self, Error> {
-        Self::begin(world, streams, None)
+        Self::from_start(world, streams, None)
     }
 
-    /// A robot that starts on a given gate, beside its centre and turned as [`Run::new`] would have it. Each lap meets the draws
-    /// that it would meet there.
+    /// A robot that starts on a given gate, if one is given, beside its centre and turned as [`Run::new`] would have it. Each lap
+    /// meets the draws that it would meet there.
     ///
     /// # Errors
     /// As [`Run::new`].
-    pub fn from_start(world: &'w World<'w>, streams: Streams, start: Start) -> Result<Self, Error> {
-        Self::begin(world, streams, Some(start))
-    }
-
-    fn begin(world: &'w World<'w>, streams: Streams, given: Option<Start>) -> Result<Self, Error> {
+    pub fn from_start(world: &'w World<'w>, streams: Streams, start: Option<Start>) -> Result<Self, Error> {
         let mut draws = streams.open("start");
         let gates = &world.circuit().gates;
         let drawn = draws.index(gates.len());
@@ -74,7 +70,7 @@ impl<'w> Run<'w> {
             world.rules().start_offset_m * draws.symmetric(),
             world.rules().start_heading_rad * draws.symmetric(),
         );
-        let Start { gate, time_s } = given.unwrap_or(Start {
+        let Start { gate, time_s } = start.unwrap_or(Start {
             gate: drawn,
             time_s: 0.0,
         });
@@ -340,29 +336,21 @@ pub fn drive(
     laps: usize,
     record: impl FnMut(&Step),
 ) -> Result<Drive, Error> {
-    drive_on(Run::new(world, streams)?, world, laps, record)
+    drive_from(world, streams, None, laps, record)
 }
 
-/// [`drive`] from a given start.
+/// [`drive`] from a given start, if one is given.
 ///
 /// # Errors
 /// As [`drive`].
 pub fn drive_from(
     world: &World<'_>,
     streams: Streams,
-    start: Start,
-    laps: usize,
-    record: impl FnMut(&Step),
-) -> Result<Drive, Error> {
-    drive_on(Run::from_start(world, streams, start)?, world, laps, record)
-}
-
-fn drive_on<'w>(
-    mut run: Run<'w>,
-    world: &'w World<'w>,
+    start: Option<Start>,
     laps: usize,
     mut record: impl FnMut(&Step),
 ) -> Result<Drive, Error> {
+    let mut run = Run::from_start(world, streams, start)?;
     let mut tracker = LapTracker::new(&world.circuit().gates, world.rules().way);
     let mut done: Vec<Lap> = Vec::with_capacity(laps + 1);
     let patience_s = world.rules().patience_laps * world.nominal_lap_s();
@@ -410,7 +398,7 @@ mod tests {
         let world = scene().world(&declared(), 0).unwrap();
         let streams = Streams { seed: 4, run: 2 };
         let gate = streams.open("start").index(world.circuit().gates.len());
-        let start = Start { gate, time_s: 0.0 };
+        let start = Some(Start { gate, time_s: 0.0 });
         let drawn = drive(&world, streams, LAPS, |_| {}).unwrap();
         assert_eq!(drive_from(&world, streams, start, LAPS, |_| {}).unwrap(), drawn);
     }
@@ -422,7 +410,7 @@ mod tests {
             model.run.way = way;
             let world = scene().world(&model, 0).unwrap();
             for gate in [20, 70] {
-                let start = Start { gate, time_s: 1000.0 };
+                let start = Some(Start { gate, time_s: 1000.0 });
                 let streams = Streams { seed: 4, run: 0 };
                 let lap = &drive_from(&world, streams, start, 1, |_| {}).unwrap().laps[0];
                 // The way to gate 0 and the dropped lap.

@@ -38,7 +38,6 @@ impl MeanLaps {
     ) -> Result<Self> {
         let mut model = setup.model.clone();
         model.effects.extend_from_slice(effects);
-        let changes = model.effects.iter().any(Setting::depends_on_time);
         let drives: Vec<sim::Drive> = (0..RUNS)
             .into_par_iter()
             .map(|i| {
@@ -48,11 +47,7 @@ impl MeanLaps {
                 };
                 let place = places[i as usize % places.len()];
                 let world = setup.scene.world(&model, place.number)?;
-                if changes {
-                    sim::drive_from(&world, streams, place.start, laps, |_| {})
-                } else {
-                    sim::drive(&world, streams, laps, |_| {})
-                }
+                sim::drive_from(&world, streams, place.start, laps, |_| {})
             })
             .collect::<Result<_, _>>()?;
         let closed = |drive: &sim::Drive| -> Vec<Vec<f64>> {

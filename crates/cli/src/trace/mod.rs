@@ -10,6 +10,7 @@ mod pages;
 mod recording;
 mod unnamed;
 
+use std::ops::Range;
 use std::path::Path;
 
 use anyhow::{Result, ensure};
@@ -22,7 +23,7 @@ pub(crate) use document::{document, parameters};
 pub(crate) use error::{MeanLaps, mean};
 use next::{Experiment, experiments};
 pub(crate) use pages::{digest, gates_csv, sections, summary};
-use recording::{Recording, RunPlace, Seeds, held_out, simulate_all};
+use recording::{Recording, Seeds, held_out, simulate_all};
 
 use crate::config::{Config, ModelFile};
 use crate::dataset::DataSet;
@@ -217,17 +218,18 @@ fn errors(
 ) -> Result<Vec<Errors>> {
     let mut all = Vec::new();
     for (place, recording) in recordings.iter().enumerate() {
-        let places = recording.places();
         let wanted = recording.shape().into_iter().fold(LAPS, usize::max);
-        let laps_of = |effects: &[Setting], places: &[RunPlace]| {
+        let laps_of = |effects: &[Setting], runs: Range<usize>| {
+            let places = &recording.places(effects)[runs];
             MeanLaps::new(&recording.setup, effects, seed, wanted, places)
         };
-        let before = laps_of(&[], &places)?;
+        let all_runs = 0..recording.measured.runs.len();
+        let before = laps_of(&[], all_runs.clone())?;
         let settings = answer.settings();
         let after = if settings.is_empty() {
             before.clone()
         } else {
-            laps_of(&settings, &places)?
+            laps_of(&settings, all_runs)?
         };
         let (held_out, before_m, after_m) = match &unseen {
             Some((at, _)) if *at != place => continue,
@@ -240,9 +242,8 @@ fn errors(
                 let runs = recording.measured.runs.clone();
                 let (mut before_m, mut after_m) = (Vec::new(), Vec::new());
                 for (at, run) in runs.iter().enumerate() {
-                    let without = &answer.left_out[places[at].number];
-                    let distance_m =
-                        |effects| anyhow::Ok(laps_of(effects, &places[at..=at])?.distance_m(run));
+                    let without = &answer.left_out[recording.first_run + at];
+                    let distance_m = |effects| anyhow::Ok(laps_of(effects, at..at + 1)?.distance_m(run));
                     let own_m = if recording.runs_are_alike() {
                         before.distance_m(run)
                     } else {
@@ -326,7 +327,7 @@ fn atlas(session: &Session, recording: &Recording, purpose: Purpose, cache: &Cac
         session.seed()
     );
     if !alike {
-        key += &format!("\n{:?}", recording.places());
+        key += &format!("\n{:?}", recording.places(&[]));
     }
     if let Some(atlas) = cache.get(&key) {
         return Ok(atlas);

@@ -7,7 +7,7 @@ use track::Lap;
 
 use super::Trace;
 use super::answer::rivals;
-use super::recording::{Recording, Seeds};
+use super::recording::{Recording, RunPlace, Seeds};
 use crate::config::Config;
 use crate::interrupt;
 use crate::setup::Setup;
@@ -153,14 +153,9 @@ fn by_laps(
     seed: u64,
 ) -> Option<Vec<(String, f64)>> {
     let simulate = |effects: &[Setting], set: u64| -> Option<Vec<Vec<Lap>>> {
-        Recording::drive(
-            setup,
-            effects,
-            Seeds { session: seed, set },
-            &[LAPS; RUNS],
-            &[],
-            0,
-        )
+        let anywhere = |number| RunPlace { number, start: None };
+        let runs = (0..RUNS).map(|run| (LAPS, anywhere(run)));
+        Recording::drive(setup, effects, Seeds { session: seed, set }, runs)
     };
     let rivals: Vec<Rival> = (others.iter())
         .map(|other| Rival {

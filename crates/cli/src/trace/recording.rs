@@ -32,8 +32,8 @@ pub(crate) struct Recording {
 pub(crate) struct RunPlace {
     /// Its number among those of all recordings: effects that go by run have a value for each.
     pub(crate) number: usize,
-    /// Where it starts, if what the robot does changes in the course of a run.
-    pub(crate) start: Start,
+    /// Where it starts, if not at random.
+    pub(crate) start: Option<Start>,
 }
 
 impl Recording {
@@ -91,74 +91,68 @@ impl Recording {
         self.setup.model.effects.iter().all(Setting::same_in_every_run)
     }
 
-    /// The measured runs as places of simulated ones.
-    pub(super) fn places(&self) -> Vec<RunPlace> {
+    /// The measured runs as places of runs simulated with these effects: they start where the measured ones did if what the
+    /// robot does changes in the course of a run.
+    pub(super) fn places(&self, effects: &[Setting]) -> Vec<RunPlace> {
+        let changes = (self.setup.model.effects.iter().chain(effects)).any(Setting::depends_on_time);
         (self.measured.runs.iter().enumerate())
             .map(|(i, run)| RunPlace {
                 number: self.first_run + i,
-                start: run.start(),
+                start: changes.then(|| run.start()),
             })
             .collect()
     }
 
-    /// One simulated data set of this one's shape; `None` where a run does not complete its laps. Runs start where the
-    /// measured ones did if what the robot does changes in the course of a run.
-    pub(super) fn simulate(&self, setup: &Setup, effects: &[Setting], seeds: Seeds) -> Option<Vec<Vec<Lap>>> {
-        let changes = (setup.model.effects.iter().chain(effects)).any(Setting::depends_on_time);
-        let starts: Vec<Start> = if changes {
-            self.places().iter().map(|place| place.start).collect()
-        } else {
-            Vec::new()
-        };
-        Self::drive(setup, effects, seeds, &self.shape(), &starts, self.first_run)
+    /// One simulated data set of this one's shape; `None` where a run does not complete its laps.
+    pub(super) fn simulate(&self, effects: &[Setting], seeds: Seeds) -> Option<Vec<Vec<Lap>>> {
+        self.simulate_at(self.places(effects), &self.setup, effects, seeds)
     }
 
-    /// The same whatever was measured, unless the declared model itself changes in the course of a run.
+    /// The same of another setup, whatever was measured unless the declared model itself changes in the course of a run.
     pub(super) fn simulate_anywhere(
         &self,
         setup: &Setup,
         effects: &[Setting],
         seeds: Seeds,
     ) -> Option<Vec<Vec<Lap>>> {
-        if self.runs_are_alike() {
-            Self::drive(setup, effects, seeds, &self.shape(), &[], self.first_run)
-        } else {
-            self.simulate(setup, effects, seeds)
-        }
+        self.simulate_at(self.places(&[]), setup, effects, seeds)
     }
 
-    /// One simulated data set of `laps` laps of each run, from random starts where none are given. Its runs take the values
-    /// of effects that go by run from `first_run` on.
+    fn simulate_at(
+        &self,
+        places: Vec<RunPlace>,
+        setup: &Setup,
+        effects: &[Setting],
+        seeds: Seeds,
+    ) -> Option<Vec<Vec<Lap>>> {
+        Self::drive(setup, effects, seeds, self.shape().into_iter().zip(places))
+    }
+
+    /// One simulated data set: so many laps of a run at each place.
     pub(super) fn drive(
         setup: &Setup,
         effects: &[Setting],
         seeds: Seeds,
-        laps: &[usize],
-        starts: &[Start],
-        first_run: usize,
+        runs: impl Iterator<Item = (usize, RunPlace)>,
     ) -> Option<Vec<Vec<Lap>>> {
         if interrupt::check().is_err() {
             return None;
         }
         let mut model = setup.model.clone();
         model.effects.extend_from_slice(effects);
-        let run = |(run, &laps): (usize, &usize)| {
-            let world = setup.scene.world(&model, first_run + run).ok()?;
+        let run = |(run, (laps, place)): (usize, (usize, RunPlace))| {
+            let world = setup.scene.world(&model, place.number).ok()?;
             let streams = Streams {
                 seed: seeds.of_fit(),
                 run: run as u64,
             };
-            let drive = match starts.get(run) {
-                Some(&start) => sim::drive_from(&world, streams, start, laps, |_| {}),
-                None => sim::drive(&world, streams, laps, |_| {}),
-            };
-            let drive = drive.ok()?;
+            let drive = sim::drive_from(&world, streams, place.start, laps, |_| {}).ok()?;
             let closed: Vec<Lap> = (drive.laps.into_iter())
                 .filter(|lap| lap.missed.is_empty())
                 .collect();
             (closed.len() == laps).then_some(closed)
         };
-        laps.iter().enumerate().map(run).collect()
+        runs.enumerate().map(run).collect()
     }
 }
 
@@ -182,7 +176,7 @@ pub(super) fn simulate_all(
     effects: &[Setting],
     seeds: Seeds,
 ) -> Option<Vec<Vec<Lap>>> {
-    let parts = (recordings.iter()).map(|recording| recording.simulate(&recording.setup, effects, seeds));
+    let parts = (recordings.iter()).map(|recording| recording.simulate(effects, seeds));
     Some(parts.collect::<Option<Vec<_>>>()?.concat())
 }
 

@@ -7,6 +7,7 @@ use super::atlas::{Atlas, Simulate, White, white};
 use super::expectation::{Expectation, Scatter};
 use super::hypothesis::{Freedom, Hypothesis};
 use super::layout::Layout;
+use super::likelihood::Fit;
 use super::simulated::Evaluated;
 
 impl Atlas {
@@ -189,8 +190,7 @@ pub(super) struct Nearest {
     pub(super) covariance: DMatrix<f64>,
     /// Standard errors of the moves, the simulation's own error included.
     pub(super) errors: Vec<f64>,
-    /// What is left of the data there.
-    pub(super) left: White,
+    pub(super) fit: Fit,
     /// Log-likelihood that the moves are hoped to gain.
     pub(super) hoped: f64,
 }
@@ -212,9 +212,9 @@ impl Atlas {
         Nearest {
             errors: variances.iter().map(|variance| variance.sqrt()).collect(),
             hoped: 0.5 * (target.norm_squared() - left.norm_squared()),
+            fit: self.fit_of(data, left, scatter, center.doubt),
             moves,
             covariance,
-            left,
         }
     }
 }

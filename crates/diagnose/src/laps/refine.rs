@@ -186,26 +186,25 @@ impl Atlas {
             scatter,
             columns,
         } = &local;
-        let Nearest {
-            moves,
-            covariance,
-            errors,
-            left,
-            hoped,
-        } = self.nearest(data, center, scatter, columns, &freedoms);
-        let fit = self.fit_of(data, left, scatter, center.doubt);
+        let nearest = self.nearest(data, center, scatter, columns, &freedoms);
         let gain = if round == Round::Rough {
-            fit.gain + fit.lost_to_doubt
-                - 0.5 * (self.least_left(&hypothesis) - fit.residual.norm_squared()).max(0.0)
+            let Fit {
+                gain,
+                lost_to_doubt,
+                residual,
+                ..
+            } = &nearest.fit;
+            gain + lost_to_doubt - 0.5 * (self.least_left(&hypothesis) - residual.norm_squared()).max(0.0)
         } else {
             let sets = self.enough(round.sets(), 1);
             let center = self.evaluate_more(simulate, &hypothesis, center.clone(), sets)?;
-            self.likely_gain(data, &hypothesis, &center, hoped)?
+            self.likely_gain(data, &hypothesis, &center, nearest.hoped)?
         };
+        let Nearest { moves, errors, .. } = nearest;
         let hypothesis = self.with_moves(&hypothesis, &freedoms, &moves);
-        let found = full && is_settled(&moves, &covariance, &freedoms);
+        let found = full && is_settled(&moves, &nearest.covariance, &freedoms);
         let holds = are_within_steps(&moves, &freedoms);
-        let remainder = full.then(|| FourNumbers::new(&fit.residual, &self.layout));
+        let remainder = full.then(|| FourNumbers::new(&nearest.fit.residual, &self.layout));
         for (i, freedom) in freedoms.iter_mut().enumerate() {
             // The parabola should hold where the answer may lie, and be wide enough for the noise of its points not to
             // pass for information.
@@ -248,17 +247,11 @@ impl Atlas {
         let columns: Vec<Column> = (local.columns.iter().zip(moved.iter()))
             .map(|(column, moved)| column.from(*moved))
             .collect();
-        let Nearest {
-            moves,
-            covariance,
-            errors,
-            left,
-            hoped,
-        } = self.nearest(data, &center, &local.scatter, &columns, &freedoms);
-        let fit = self.fit_of(data, left, &local.scatter, center.doubt);
-        let gain = self.likely_gain(data, &descent.hypothesis, &center, hoped)?;
-        let found = full && is_settled(&moves, &covariance, &freedoms);
-        let remainder = Some(FourNumbers::new(&fit.residual, &self.layout));
+        let nearest = self.nearest(data, &center, &local.scatter, &columns, &freedoms);
+        let gain = self.likely_gain(data, &descent.hypothesis, &center, nearest.hoped)?;
+        let Nearest { moves, errors, .. } = nearest;
+        let found = full && is_settled(&moves, &nearest.covariance, &freedoms);
+        let remainder = Some(FourNumbers::new(&nearest.fit.residual, &self.layout));
         let at_rest =
             found && (moves.iter().zip(&errors)).all(|(moved, error)| moved.abs() < AT_REST * error);
         let (hypothesis, moved, end) = if at_rest {
