@@ -131,7 +131,20 @@ fn sensors_that_warm_up_are_a_gain_that_changes_in_time() {
     let effect = &found["effects"][0];
     assert_eq!(effect["by"], "time", "{found:#}");
     let name = effect["name"].as_str().unwrap();
-    assert!(GAINS.contains(&name), "{found:#}");
+    // No program's constant drifts.
+    assert!(GAINS.contains(&name) && name != "controller-gain", "{found:#}");
+}
+
+#[test]
+fn a_marker_far_ahead_is_there_in_every_run() {
+    const FORWARD_M: f64 = 0.0157;
+    share_signatures("braitenberg");
+    let scratch = Scratch::new();
+    let marker = Setting::constant(sim::find("marker-offset").unwrap(), [FORWARD_M, 0.0, 0.0]);
+    Robot::with(marker).record(&scratch, "set");
+    let found = trace(&scratch, "braitenberg", "set", &[]);
+    says(&found, "explained", &["marker-offset"]);
+    assert!(found["effects"][0]["by"].is_null(), "{found:#}");
 }
 
 #[test]
@@ -143,6 +156,17 @@ fn a_listed_effect_under_another_name_is_named_from_logs() {
     holds(&found["effects"][0], "ratio", LIMPING, 1.0);
     assert_eq!(found["logs"]["decide"]["verdict"], "as declared", "{found:#}");
     assert_eq!(found["logs"]["confirmed_by_laps"], true, "{found:#}");
+}
+
+#[test]
+fn an_offset_that_cuts_most_readings_is_one_effect_in_logs() {
+    const COUNTS: f64 = -73.0;
+    let scratch = Scratch::new();
+    let offset = Setting::constant(sim::find("ambient-offset").unwrap(), [COUNTS]);
+    Robot::with(offset).logged(&[3; 3]).record(&scratch, "set");
+    let found = trace(&scratch, "braitenberg", "set", &[]);
+    says(&found, "explained", &["ambient-offset"]);
+    holds(&found["effects"][0], "counts", COUNTS, 0.0);
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-/// A cell of more characters than this is broken into lines.
+/// A column with a cell of more characters than this is broken into lines.
 const PROSE: usize = 40;
 
 /// Named columns and rows of words.
@@ -79,13 +79,17 @@ impl Table {
 
     /// As an HTML table; the title is its caption.
     pub(crate) fn to_html(&self) -> String {
+        let is_prose = |column: usize| {
+            let mut cells = self.rows.iter().filter_map(|row| row.get(column));
+            cells.any(|cell| cell.chars().count() > PROSE)
+        };
+        let prose: Vec<bool> = (0..self.columns.len()).map(is_prose).collect();
         let cells = |tag: &str, row: &[String]| {
-            let cell = |cell: &String| {
-                let prose = tag == "td" && cell.chars().count() > PROSE;
-                let class = if prose { " class=\"prose\"" } else { "" };
+            let cell = |(cell, prose): (&String, &bool)| {
+                let class = if *prose { " class=\"prose\"" } else { "" };
                 format!("<{tag}{class}>{}</{tag}>", escape(cell))
             };
-            row.iter().map(cell).collect::<String>()
+            row.iter().zip(&prose).map(cell).collect::<String>()
         };
         let mut html = String::from("<table>\n");
         if !self.title.is_empty() {
@@ -121,22 +125,51 @@ pub(crate) fn probability(p: f64) -> String {
     }
 }
 
-/// A number with four significant digits, trailing zeros left out.
+/// A number with four significant digits, trailing zeros left out; a very small one with its power of ten.
 pub(crate) fn four_digits(x: f64) -> String {
-    format!("{x:.3e}")
-        .parse::<f64>()
-        .map_or(String::new(), |x| format!("{x}"))
+    let rounded: f64 = format!("{x:.3e}").parse().unwrap_or(x);
+    if rounded != 0.0 && rounded.abs() < SMALL {
+        format!("{rounded:e}")
+    } else {
+        format!("{rounded}")
+    }
 }
 
 /// A number with its standard error, which has two significant digits.
 pub(crate) fn with_error(value: f64, error: f64) -> String {
-    // Rounded first: 0.0996 has its second digit where 0.10 has.
-    let power = format!("{error:.1e}")
+    if value.abs().max(error) < SMALL {
+        let power = power_of_ten(value.abs().max(error));
+        let up = 10.0_f64.powi(-power);
+        return format!("({})e{power}", with_error(up * value, up * error));
+    }
+    let decimals = decimals(error);
+    format!("{value:.decimals$} ± {error:.decimals$}")
+}
+
+/// A number by whose distance from a neutral one it matters: of the distance it shows two significant digits.
+pub(crate) fn far_from(neutral: f64, x: f64) -> String {
+    let distance = (x - neutral).abs();
+    if neutral == 0.0 && distance < SMALL {
+        return format!("{x:.1e}");
+    }
+    let decimals = decimals(distance);
+    format!("{x:.decimals$}")
+}
+
+/// Numbers below this are shown with their power of ten.
+const SMALL: f64 = 1e-3;
+
+/// Decimals with which a number has two significant digits.
+fn decimals(x: f64) -> usize {
+    usize::try_from(1 - power_of_ten(x)).unwrap_or(0)
+}
+
+/// The power of ten of a number rounded to two significant digits: 0.0996 has its second digit where 0.10 has.
+fn power_of_ten(x: f64) -> i32 {
+    format!("{x:.1e}")
         .split_once('e')
         .and_then(|(_, power)| power.parse().ok())
-        .unwrap_or(0);
-    let decimals = usize::try_from(1 - power).unwrap_or(0);
-    format!("{value:.decimals$} ± {error:.decimals$}")
+        .unwrap_or(0)
 }
 
 #[cfg(test)]
@@ -145,13 +178,24 @@ mod tests {
 
     #[test]
     fn errors_have_two_digits_and_values_as_many_as_their_errors() {
-        assert_eq!(with_error(1.5e-4, 1.1e-6), "0.0001500 ± 0.0000011");
+        assert_eq!(with_error(1.5e-4, 1.1e-6), "(1.500 ± 0.011)e-4");
         assert_eq!(with_error(-0.078_04, 0.002_24), "-0.0780 ± 0.0022");
         assert_eq!(with_error(37.66, 1.249), "37.7 ± 1.2");
         assert_eq!(with_error(1234.5, 0.0996), "1234.50 ± 0.10");
         assert_eq!(with_error(1234.5, 123.0), "1234 ± 123");
         assert_eq!(four_digits(0.063_514_8), "0.06351");
         assert_eq!(four_digits(-2.0), "-2");
+        assert_eq!(four_digits(0.000_012_34), "1.234e-5");
+        assert_eq!(four_digits(0.0), "0");
+    }
+
+    #[test]
+    fn what_is_near_its_neutral_value_shows_by_how_much() {
+        assert_eq!(far_from(1.0, 0.999_726), "0.99973");
+        assert_eq!(far_from(1.0, 1.234), "1.23");
+        assert_eq!(far_from(0.0, -1.578), "-1.6");
+        assert_eq!(far_from(0.0, 8.046e-7), "8.0e-7");
+        assert_eq!(far_from(0.0, 59.83), "60");
     }
 
     #[test]

@@ -140,13 +140,14 @@ fn residual(trace: &Trace) -> Value {
 
 fn effects(answer: &Explanation, rivals: &[Explanation]) -> Vec<Value> {
     let count = answer.effects.len() as f64;
+    let names = answer.names();
+    let rivals: Vec<Vec<&str>> = rivals
+        .iter()
+        .map(|rival| in_place(&names, rival.names()))
+        .collect();
     let effect = |(place, effect): (usize, &Candidate)| {
-        let name = effect.setting.spec.name;
-        let others = rivals
-            .iter()
-            .filter_map(|rival| rival.names().get(place).copied())
-            .filter(|n| *n != name);
-        let mut alternatives: Vec<&str> = others.collect();
+        let others = rivals.iter().filter_map(|rival| rival.get(place).copied());
+        let mut alternatives: Vec<&str> = others.filter(|other| *other != names[place]).collect();
         alternatives.sort_unstable();
         alternatives.dedup();
         let mut entry = one_effect(effect);
@@ -155,6 +156,19 @@ fn effects(answer: &Explanation, rivals: &[Explanation]) -> Vec<Value> {
         entry
     };
     answer.effects.iter().enumerate().map(effect).collect()
+}
+
+/// A rival's names in such an order that those of the answer stand in their places, and the others in the places that remain.
+fn in_place<'n>(answer: &[&str], rival: Vec<&'n str>) -> Vec<&'n str> {
+    let (shared, others): (Vec<&str>, Vec<&str>) = rival.into_iter().partition(|name| answer.contains(name));
+    let mut others = others.into_iter();
+    answer
+        .iter()
+        .filter_map(|name| {
+            let same = shared.iter().find(|shared| *shared == name).copied();
+            same.or_else(|| others.next())
+        })
+        .collect()
 }
 
 /// An effect by itself; one without a name says what it acts on and depends on.
@@ -255,4 +269,26 @@ fn distinct<T: PartialEq>(items: impl Iterator<Item = T>) -> Vec<T> {
         }
     }
     list
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn alternatives_stand_for_the_effect_that_they_replace() {
+        assert_eq!(
+            in_place(&["light", "slip"], vec!["memory", "light"]),
+            ["light", "memory"]
+        );
+        assert_eq!(
+            in_place(&["light", "slip"], vec!["light", "memory"]),
+            ["light", "memory"]
+        );
+        assert_eq!(in_place(&["gain"], vec!["scale"]), ["scale"]);
+        assert_eq!(
+            in_place(&["gain", "slip"], vec!["lag", "memory"]),
+            ["lag", "memory"]
+        );
+    }
 }

@@ -3,11 +3,12 @@
 use std::collections::BTreeMap;
 
 use diagnose::{Decided, Detectable};
+use sim::Param;
 
 use super::Trace;
 use super::next::Experiment;
 use crate::experiments::Block;
-use crate::table::{Table, four_digits, probability};
+use crate::table::{Table, far_from, probability};
 
 /// The next experiment in a sentence; `None` where nothing has to be told apart.
 pub(crate) fn next_in_words(trace: &Trace) -> Option<String> {
@@ -107,10 +108,13 @@ fn range(all: &[&Detectable], of: &dyn Fn(&Detectable) -> Option<f64>, falling: 
     } else {
         ""
     };
+    let sized = |p: &&Param| p.name == all[0].parameter;
+    let neutral = all[0].spec.params.iter().find(sized).and_then(|p| p.neutral);
+    let shown = |size: &f64| far_from(neutral.unwrap_or(0.0), *size);
     Some(if sizes.len() == 1 {
-        format!("{}{hidden}", four_digits(*first))
+        format!("{}{hidden}", shown(first))
     } else {
-        format!("{} to {}{hidden}", four_digits(*first), four_digits(*last))
+        format!("{} to {}{hidden}", shown(first), shown(last))
     })
 }
 

@@ -7,6 +7,7 @@ mod error;
 mod limits;
 mod next;
 mod pages;
+mod pictures;
 mod recording;
 mod unnamed;
 

@@ -1,16 +1,14 @@
 //! A trace as a colleague would write it: sections of a report.
 
 use anyhow::Result;
-use chart::{Color, ColorMap, ColorScale, Dash, Figure, Mark, Shape, Style};
-use diagnose::{Cause, Explanation, FourNumbers, Verdict};
+use diagnose::{Candidate, Cause, Explanation, FourNumbers, Quadratic, Verdict};
 use sim::Pattern;
-use track::Lap;
 
 use super::limits::{limits, next_experiment, next_in_words, stages};
 use super::unnamed::unnamed;
-use super::{MeanLaps, Trace, mean};
+use super::{MeanLaps, Trace, mean, pictures};
 use crate::experiments::{Block, Picture, Section};
-use crate::figures::{MM, across, crossings, line, map, single, walls};
+use crate::figures::MM;
 use crate::laps::SampledRun;
 use crate::table::{Table, four_digits, probability, with_error};
 
@@ -146,7 +144,21 @@ pub(crate) fn gates_csv(trace: &Trace) -> String {
 }
 
 /// An effect with its size, for a sentence.
-fn describe(effect: &diagnose::Candidate) -> String {
+fn describe(effect: &Candidate) -> String {
+    let name = effect.setting.spec.name;
+    match (&effect.setting.pattern, Cause::of(&effect.setting)) {
+        (_, Some(cause)) => format!(
+            "an effect without a name on the {} that depends on the {}",
+            cause.acts_on, cause.depends_on
+        ),
+        (Pattern::Constant(_), _) => format!("{name} ({})", size(effect)),
+        (Pattern::ByTime { .. }, _) => format!("{name} changing in time ({})", size(effect)),
+        (Pattern::ByRun(_), _) => format!("{name} by run ({})", size(effect)),
+    }
+}
+
+/// The size of an effect, with its standard error where it was fitted.
+fn size(effect: &Candidate) -> String {
     let params = effect.setting.spec.params;
     let number = |value: f64, error: f64| {
         if error > 0.0 {
@@ -162,38 +174,26 @@ fn describe(effect: &diagnose::Candidate) -> String {
         };
         params.iter().enumerate().map(one).collect::<Vec<_>>().join(", ")
     };
-    let changes = |per_s: &[f64], errors: &[f64]| {
-        let changing = params
-            .iter()
-            .zip(per_s)
-            .zip(errors)
-            .filter(|((_, slope), _)| **slope != 0.0);
-        changing
-            .map(|((p, slope), error)| format!("; {} changes by {} per s", p.name, number(*slope, *error)))
-            .collect::<String>()
-    };
-    let name = effect.setting.spec.name;
-    if let Some(cause) = Cause::of(&effect.setting) {
-        return format!(
-            "an effect without a name on the {} that depends on the {}",
-            cause.acts_on, cause.depends_on
-        );
-    }
+    let errors = &effect.standard_errors;
     match &effect.setting.pattern {
-        Pattern::Constant(values) => format!("{name} ({})", list(values, &effect.standard_errors)),
-        Pattern::ByTime { start, per_s } => format!(
-            "{name} changing in time ({} at the start{})",
-            list(start, &effect.standard_errors),
-            changes(per_s, &effect.standard_errors[params.len()..])
-        ),
+        Pattern::Constant(values) => list(values, errors),
+        Pattern::ByTime { start, per_s } => {
+            let changing = params.iter().zip(per_s).zip(&errors[params.len()..]);
+            let changes = changing
+                .filter(|((_, slope), _)| **slope != 0.0)
+                .map(|((p, slope), error)| {
+                    format!("; {} changes by {} per s", p.name, number(*slope, *error))
+                });
+            format!(
+                "{} at the start{}",
+                list(start, errors),
+                changes.collect::<String>()
+            )
+        }
         Pattern::ByRun(runs) => {
-            let count = params.len();
-            let each: Vec<String> = runs
-                .iter()
-                .enumerate()
-                .map(|(r, values)| list(values, &effect.standard_errors[r * count..(r + 1) * count]))
-                .collect();
-            format!("{name} by run ({})", each.join("; "))
+            let each = runs.iter().zip(errors.chunks(params.len()));
+            let each: Vec<String> = each.map(|(values, errors)| list(values, errors)).collect();
+            each.join("; ")
         }
     }
 }
@@ -261,34 +261,25 @@ fn distance(laps: &MeanLaps, runs: &[SampledRun], modes: usize) -> Option<f64> {
 }
 
 fn residual(trace: &Trace) -> Vec<Block> {
+    let answer = trace.answer.explanations.first();
     let mut table = Table::new(
-        "Four numbers, each with its expectation under the model",
-        &["", "excess", "freedom", "p"],
+        "What the laps hold beyond the expectation of the declared model, and of the model with the answer",
+        &["", "freedom", "excess", "p", "with the answer", "p"],
     );
-    let mut rows = |numbers: &FourNumbers, when: &str| {
-        let named = [
+    let named = |numbers: &FourNumbers| {
+        [
             ("mean lap", numbers.mean),
             ("run to run", numbers.runs),
             ("drift within runs", numbers.trend),
             ("noise", numbers.noise),
-        ];
-        for (name, q) in named {
-            table.push([
-                format!("{name}, {when}"),
-                format!("{:.0}", q.excess()),
-                q.freedom.to_string(),
-                probability(q.p),
-            ]);
-        }
+        ]
     };
-    rows(&trace.residual, "declared model");
-    if let Some(remainder) = trace
-        .answer
-        .explanations
-        .first()
-        .and_then(|a| a.remainder.as_ref())
-    {
-        rows(remainder, "with the answer");
+    let shown = |q: Quadratic| [format!("{:.0}", q.excess()), probability(q.p)];
+    let remainder = answer.and_then(|answer| answer.remainder.as_ref()).map(named);
+    for (i, (name, declared)) in named(&trace.residual).into_iter().enumerate() {
+        let left = remainder.map_or(["-".into(), "-".into()], |left| shown(left[i].1));
+        let row = [name.to_owned(), declared.freedom.to_string()];
+        table.push(row.into_iter().chain(shown(declared)).chain(left));
     }
     vec![
         Block::Table(table),
@@ -296,52 +287,9 @@ fn residual(trace: &Trace) -> Vec<Block> {
             "residual_map",
             "Fig. A",
             "Where the residual sits: the mean measured lap, coloured by its distance from the declared model's.",
-            residual_map(trace),
+            pictures::residual_map(trace),
         ),
     ]
-}
-
-fn mean_measured(trace: &Trace) -> Vec<f64> {
-    let laps: Vec<Vec<f64>> = trace.recordings[0]
-        .measured
-        .runs
-        .iter()
-        .flat_map(SampledRun::offsets_m)
-        .collect();
-    mean(laps.iter()).unwrap_or_default()
-}
-
-fn residual_map(trace: &Trace) -> Figure {
-    let circuit = trace.recordings[0].setup.scene.circuit();
-    let measured = mean_measured(trace);
-    let mut points = crossings(circuit, &measured);
-    let mut values: Vec<f64> = measured
-        .iter()
-        .zip(&trace.errors[0].before.mean_m)
-        .map(|(m, s)| MM * (m - s))
-        .collect();
-    points.push(points[0]);
-    values.push(values[0]);
-    let most = values.iter().fold(0.1_f64, |m, v| m.max(v.abs()));
-    let style = Style {
-        width_px: 5.0,
-        ..Style::color(Color::INK)
-    };
-    let marks = vec![
-        walls(&circuit.course),
-        Mark::new("", style, Shape::ColoredLine { points, values }),
-    ];
-    let mut panel = map("", marks);
-    panel.colors = Some(ColorScale {
-        label: "measured less simulated, mm (left: positive)".into(),
-        map: ColorMap::Diverging,
-        range: Some([-most, most]),
-    });
-    single(
-        "Residual map",
-        "The mean measured lap, coloured by its distance from the declared model's mean lap.",
-        panel,
-    )
 }
 
 fn candidates(trace: &Trace) -> Vec<Block> {
@@ -378,96 +326,26 @@ fn candidates(trace: &Trace) -> Vec<Block> {
 }
 
 fn sizes(explanation: &Explanation) -> String {
-    explanation
-        .effects
-        .iter()
-        .map(describe)
-        .collect::<Vec<_>>()
-        .join(" + ")
+    match explanation.effects.as_slice() {
+        [effect] if Cause::of(&effect.setting).is_none() => size(effect),
+        effects => effects.iter().map(describe).collect::<Vec<_>>().join(" + "),
+    }
 }
 
 fn before_and_after(trace: &Trace) -> Vec<Block> {
-    let measured = mean_measured(trace);
-    let curves = [
-        (
-            "measured".to_owned(),
-            measured,
-            line(Color::INK, Dash::Solid, 2.0),
-        ),
-        (
-            "declared model".to_owned(),
-            trace.errors[0].before.mean_m.clone(),
-            line(Color::VERMILLION, Dash::Dashed, 1.6),
-        ),
-        (
-            "with the answer".to_owned(),
-            trace.errors[0].after.mean_m.clone(),
-            line(Color::BLUE, Dash::Solid, 1.6),
-        ),
-    ];
-    let mean_laps = single(
-        "Mean laps",
-        "Mean position at each gate: measured, declared model, with the answer.",
-        across(&curves),
-    );
-    let circuit = trace.recordings[0].setup.scene.circuit();
-    let mut marks = vec![walls(&circuit.course)];
-    let closed = |offsets: &[f64]| {
-        let mut points = crossings(circuit, offsets);
-        points.extend([points[0], chart::GAP]);
-        points
-    };
-    let measured_laps: Vec<[f64; 2]> = trace.recordings[0]
-        .measured
-        .runs
-        .iter()
-        .flat_map(|run| run.laps.iter().take(5))
-        .flat_map(|lap: &Lap| closed(&lap.offsets_m))
-        .collect();
-    let few = |laps: &MeanLaps| {
-        laps.laps_m()
-            .step_by(64)
-            .take(10)
-            .flat_map(|lap| closed(lap))
-            .collect::<Vec<_>>()
-    };
-    let style = |color: Color| Style {
-        width_px: 0.8,
-        opacity: 0.6,
-        ..Style::color(color)
-    };
-    marks.push(Mark::new(
-        "measured",
-        style(Color::INK),
-        Shape::Line(measured_laps),
-    ));
-    marks.push(Mark::new(
-        "declared model",
-        style(Color::VERMILLION),
-        Shape::Line(few(&trace.errors[0].before)),
-    ));
-    marks.push(Mark::new(
-        "with the answer",
-        style(Color::BLUE),
-        Shape::Line(few(&trace.errors[0].after)),
-    ));
-    let laps = single(
-        "Laps before and after",
-        "Laps of the declared model and with the answer over the measured ones.",
-        map("", marks),
-    );
     vec![
         Picture::block(
             "mean_laps",
             "Fig. B",
-            "Mean position at each gate: measured, simulated with the declared model, and with the answer.",
-            mean_laps,
+            "Mean position at each gate: measured, simulated with the declared model, and with the answer. Below, what each of the \
+             two leaves of the measured mean lap; in the band, 95 of 100 gates lie by chance.",
+            pictures::mean_laps(trace),
         ),
         Picture::block(
             "laps",
             "Fig. C",
             "Laps of the declared model and with the answer, over measured ones.",
-            laps,
+            pictures::laps(trace),
         ),
     ]
 }

@@ -2,10 +2,11 @@
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
+use sim::Stage;
 
 use super::atlas::{Atlas, Simulate};
 use super::expectation::Expectation;
-use super::hypothesis::{Freedom, Hypothesis};
+use super::hypothesis::{Freedom, Hypothesis, Part, Shape};
 use super::likelihood::Fit;
 use super::parabola::{Column, Local, Nearest};
 use super::screen::price;
@@ -380,10 +381,16 @@ impl Atlas {
         Settled { refined, evaluated }
     }
 
-    /// What a hypothesis pays for its fitted numbers and for the choice of its probes.
+    /// What a hypothesis pays for its fitted numbers, for the choice of its probes, and for what robots hardly do.
     fn price_of(&self, hypothesis: &Hypothesis) -> f64 {
-        let choices: f64 = hypothesis.parts.iter().map(|part| self.choice(part.probe)).sum();
-        price(hypothesis.fitted(self), self.layout.total_laps()) + choices
+        /// A program's constants stay what they are while it runs: one in twenty that something drifts for another cause.
+        const DRIFTING_PROGRAM: f64 = 3.0;
+        let of_part = |part: &Part| {
+            let drifts = part.shape == Shape::ByTime && self.probes[part.probe].spec.stage == Stage::Decide;
+            self.choice(part.probe) + if drifts { DRIFTING_PROGRAM } else { 0.0 }
+        };
+        let parts: f64 = hypothesis.parts.iter().map(of_part).sum();
+        price(hypothesis.fitted(self), self.layout.total_laps()) + parts
     }
 
     /// Sizes that come in steps brought to the nearest.

@@ -210,8 +210,8 @@ impl Search<'_> {
             .collect()
     }
 
-    /// The screened hypotheses worth a simulation: each probe in its best pattern, of one effect the best two. What acts at
-    /// a place was screened at a coarse grid of places with one length, and is given more room.
+    /// The screened hypotheses worth a simulation: each probe in its best pattern, and without it, of one effect the best two.
+    /// What acts at a place was screened at a coarse grid of places with one length, and is given more room.
     fn shortlist<'s>(&self, screened: &'s [Screened]) -> Vec<&'s Screened> {
         const MOST: usize = 7;
         const OF_ONE_EFFECT: usize = 2;
@@ -233,9 +233,15 @@ impl Search<'_> {
             if candidate.score < share * best.score - 20.0 {
                 continue;
             }
-            let seen = list.iter().any(|s| probe(s) == probe(candidate));
-            let alike = list.iter().filter(|s| spec(s) == spec(candidate)).count();
-            if !seen && alike < OF_ONE_EFFECT {
+            let of_probe = |s: &&&Screened| probe(s) == probe(candidate);
+            // A size by run may come first by the faults of a path alone.
+            let plain = |s: &Screened| s.hypothesis.parts[0].shape == Shape::Constant;
+            let seen = list
+                .iter()
+                .filter(of_probe)
+                .any(|s| plain(s) || !plain(candidate));
+            let alike = list.iter().filter(|s| spec(s) == spec(candidate) && !of_probe(s));
+            if !seen && alike.count() < OF_ONE_EFFECT {
                 list.push(candidate);
             }
         }

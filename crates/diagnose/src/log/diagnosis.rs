@@ -355,20 +355,42 @@ impl<'a> Search<'a> {
             more.extend(self.beside(&best, leads));
             more.extend(self.joint(first));
         }
+        // An effect that linear algebra did not see may stand alone.
+        let pair = more.iter().max_by(|a, b| a.score().total_cmp(&b.score()));
+        let alone = pair.map_or(Vec::new(), |pair| self.each_alone(pair));
+        let better = alone.into_iter().filter(|alone| alone.score() > best.score());
+        self.found.extend(better);
+        self.sort();
+        let best = self.found[0].clone();
         // Each further value must gain ten.
         more.retain(|pair| {
             let further = pair.fitted.saturating_sub(best.fitted).max(1) as f64;
             pair.gain - best.gain > (10.0 * further).max(FAULTS * best.gain)
         });
-        if more.is_empty() {
-            return;
-        }
         self.found.extend(more);
         self.sort();
         let best = self.found[0].clone();
         if let Some(screened) = self.screen(&best.settings) {
             self.settle(&screened.0, &screened.1, best.gain);
         }
+    }
+
+    /// Each effect of a pair refined without the other, from where it is.
+    fn each_alone(&self, pair: &Refined) -> Vec<Refined> {
+        (pair.settings.par_iter())
+            .filter(|setting| !jumps(setting))
+            .filter_map(|setting| {
+                let variant = self
+                    .variants
+                    .iter()
+                    .find(|variant| *variant.spec == *setting.spec)?;
+                together(
+                    &self.evidence,
+                    &[(variant.clone(), setting.clone())],
+                    self.total(),
+                )
+            })
+            .collect()
     }
 
     /// Notes what is left beside an explanation.

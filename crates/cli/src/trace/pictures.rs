@@ -1,0 +1,149 @@
+//! The pictures of a trace.
+
+use chart::{Axis, Color, ColorMap, ColorScale, Dash, Figure, Interval, Mark, Shape, Style};
+use track::Lap;
+
+use super::{MeanLaps, Trace, mean};
+use crate::figures::{MM, across, crossings, line, map, single, walls};
+use crate::laps::SampledRun;
+
+/// The mean of all measured laps of the first recording, gate by gate, m.
+fn mean_measured(trace: &Trace) -> Vec<f64> {
+    let laps: Vec<Vec<f64>> = trace.recordings[0]
+        .measured
+        .runs
+        .iter()
+        .flat_map(SampledRun::offsets_m)
+        .collect();
+    mean(laps.iter()).unwrap_or_default()
+}
+
+/// Where on the circuit the residual sits.
+pub(super) fn residual_map(trace: &Trace) -> Figure {
+    let circuit = trace.recordings[0].setup.scene.circuit();
+    let measured = mean_measured(trace);
+    let mut points = crossings(circuit, &measured);
+    let mut values: Vec<f64> = measured
+        .iter()
+        .zip(&trace.errors[0].before.mean_m)
+        .map(|(m, s)| MM * (m - s))
+        .collect();
+    points.push(points[0]);
+    values.push(values[0]);
+    let most = values.iter().fold(0.1_f64, |m, v| m.max(v.abs()));
+    let style = Style {
+        width_px: 5.0,
+        ..Style::color(Color::INK)
+    };
+    let marks = vec![
+        walls(&circuit.course),
+        Mark::new("", style, Shape::ColoredLine { points, values }),
+    ];
+    let mut panel = map("", marks);
+    panel.colors = Some(ColorScale {
+        label: "measured less simulated, mm (left: positive)".into(),
+        map: ColorMap::Diverging,
+        range: Some([-most, most]),
+    });
+    single(
+        "Residual map",
+        "The mean measured lap, coloured by its distance from the declared model's mean lap.",
+        panel,
+    )
+}
+
+/// Mean laps, and below them what is left of the measured one.
+pub(super) fn mean_laps(trace: &Trace) -> Figure {
+    let measured = mean_measured(trace);
+    let errors = &trace.errors[0];
+    let declared = line(Color::VERMILLION, Dash::Dashed, 1.6);
+    let answer = line(Color::BLUE, Dash::Solid, 1.6);
+    let left = |laps: &MeanLaps| -> Vec<f64> {
+        let pairs = measured.iter().zip(&laps.mean_m);
+        pairs.map(|(measured, simulated)| measured - simulated).collect()
+    };
+    let mut below = across(&[
+        ("declared model".into(), left(&errors.before), declared),
+        ("with the answer".into(), left(&errors.after), answer),
+    ]);
+    below.y = Axis::linear("measured less simulated, mm");
+    let band = |(gate, error_m): (usize, f64)| Interval {
+        at: gate as f64,
+        low: -1.96 * MM * error_m,
+        high: 1.96 * MM * error_m,
+    };
+    let shape = trace.recordings[0].shape();
+    let errors_m = errors.after.standard_error_m(&shape);
+    let chance = errors_m.into_iter().enumerate().map(band).collect();
+    let style = Style::color(Color::INK);
+    below
+        .marks
+        .insert(0, Mark::new("95 % by chance", style, Shape::Band(chance)));
+    let above = across(&[
+        (
+            "measured".into(),
+            measured.clone(),
+            line(Color::INK, Dash::Solid, 2.0),
+        ),
+        ("declared model".into(), errors.before.mean_m.clone(), declared),
+        ("with the answer".into(), errors.after.mean_m.clone(), answer),
+    ]);
+    Figure {
+        title: "Mean laps".into(),
+        description:
+            "Mean position at each gate: measured, declared model, with the answer; and what the two leave."
+                .into(),
+        panels: vec![above, below],
+        ..Figure::default()
+    }
+}
+
+/// Laps before and after over measured ones.
+pub(super) fn laps(trace: &Trace) -> Figure {
+    let circuit = trace.recordings[0].setup.scene.circuit();
+    let mut marks = vec![walls(&circuit.course)];
+    let closed = |offsets: &[f64]| {
+        let mut points = crossings(circuit, offsets);
+        points.extend([points[0], chart::GAP]);
+        points
+    };
+    let measured_laps: Vec<[f64; 2]> = trace.recordings[0]
+        .measured
+        .runs
+        .iter()
+        .flat_map(|run| run.laps.iter().take(5))
+        .flat_map(|lap: &Lap| closed(&lap.offsets_m))
+        .collect();
+    let few = |laps: &MeanLaps| {
+        laps.laps_m()
+            .step_by(64)
+            .take(10)
+            .flat_map(|lap| closed(lap))
+            .collect::<Vec<_>>()
+    };
+    let style = |color: Color| Style {
+        width_px: 0.8,
+        opacity: 0.6,
+        ..Style::color(color)
+    };
+    marks.push(Mark::new(
+        "measured",
+        style(Color::INK),
+        Shape::Line(measured_laps),
+    ));
+    marks.push(Mark::new(
+        "declared model",
+        style(Color::VERMILLION),
+        Shape::Line(few(&trace.errors[0].before)),
+    ));
+    marks.push(Mark::new(
+        "with the answer",
+        style(Color::BLUE),
+        Shape::Line(few(&trace.errors[0].after)),
+    ));
+    single(
+        "Laps before and after",
+        "Laps of the declared model and with the answer over the measured ones.",
+        map("", marks),
+    )
+}
