@@ -1,5 +1,6 @@
 //! What the declared model leads one to expect, and how every probe changes it.
 
+use std::ops::Range;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use nalgebra::DVector;
@@ -145,7 +146,7 @@ impl Atlas {
             .map(|&(p, k)| {
                 let probe = &self.probes[p];
                 let setting = [probe.setting(probe.sizes[k])];
-                let same_draws = self.declared_mean(probe.sets);
+                let same_draws = self.declared_mean(0..probe.sets);
                 let sets: Option<Vec<Summary>> = (0..probe.sets)
                     .map(|set| {
                         tick();
@@ -242,9 +243,11 @@ impl Atlas {
         self.spent.0.load(Ordering::Relaxed)
     }
 
-    /// The mean of the first so many data sets simulated of the declared model.
-    pub(super) fn declared_mean(&self, sets: u64) -> Expectation {
-        let samples: Vec<&Expectation> = self.samples[..sets as usize].iter().collect();
+    /// The mean of some of the data sets simulated of the declared model.
+    pub(super) fn declared_mean(&self, sets: Range<u64>) -> Expectation {
+        let samples: Vec<&Expectation> = self.samples[sets.start as usize..sets.end as usize]
+            .iter()
+            .collect();
         Expectation::mean(&samples, self.alike)
     }
 

@@ -47,6 +47,13 @@ fn suffices(explanation: &Explanation) -> bool {
     fits(explanation) || explanation.share >= enough && explanation.remainder_p >= SURELY_P
 }
 
+/// Whether nothing that is left calls for an effect that no descent finds.
+fn leaves_nothing_to_ask(explanation: &Explanation) -> bool {
+    /// Probability of a remainder that, beside a poor share, makes one ask.
+    const DOUBTFUL_P: f64 = 0.1;
+    suffices(explanation) && (explanation.share > MOST || explanation.remainder_p >= DOUBTFUL_P)
+}
+
 /// What laps tell about a model.
 #[derive(Debug, Clone)]
 pub struct LapDiagnosis {
@@ -122,7 +129,9 @@ fn explain(search: &Search<'_>, screened: &[Screened]) -> Vec<Found> {
     let mut found = search.singles(screened);
     // Of an effect that jumps a descent finds the nearest good size, not the best.
     let jumps = found.first().is_some_and(|best| search.jumped(best));
-    if !first_is(&found, |best| suffices(best) || best.share > MOST && !jumps) {
+    if !first_is(&found, |best| {
+        leaves_nothing_to_ask(best) || best.share > MOST && !jumps
+    }) {
         let scans = search.scans();
         if !scans.is_empty() {
             found.retain(|found| !search.jumped(found));

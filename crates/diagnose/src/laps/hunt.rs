@@ -1,5 +1,7 @@
 //! The size of an effect whose action jumps with it.
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 
 use super::atlas::{Atlas, Simulate};
@@ -30,20 +32,26 @@ impl Atlas {
         probe: usize,
     ) -> Option<(f64, Hunt)> {
         const COARSE: usize = 60;
-        const COARSE_SETS: u64 = 1;
         const FAIR_SHARE: f64 = 0.25;
+        /// Data sets at each size; two pairs where less is left to explain than so many times what chance leaves.
+        const ONE: [Range<u64>; 2] = [0..1, 0..1];
+        const PAIRS: [Range<u64>; 2] = [0..2, 2..4];
+        const LITTLE: f64 = 3.0;
         let p = &self.probes[probe];
         let (low, high) = (p.sizes[0], p.sizes[p.sizes.len() - 1]);
         // Sizes in a constant ratio: what matters is how many steps fit into a speed or a reading.
         let ratio = (high / low).powf(1.0 / (COARSE - 1) as f64);
         let sizes: Vec<f64> = (0..COARSE).map(|i| low * ratio.powi(i as i32)).collect();
-        let (left, size) = least(&self.distances(simulate, data, beside, probe, &sizes, COARSE_SETS))?;
         let without = if beside.parts.is_empty() {
             self.null.clone()
         } else {
             self.evaluate(simulate, beside, CLOSER[0])?.expectation
         };
-        let fair = left < (1.0 - FAIR_SHARE) * self.white(data, &without).norm_squared();
+        let chance = self.layout.len() as f64;
+        let excess = self.white(data, &without).norm_squared() - chance;
+        let sets = if excess < LITTLE * chance { PAIRS } else { ONE };
+        let (left, size) = least(&self.distances(simulate, data, beside, probe, &sizes, &sets))?;
+        let fair = left - chance < (1.0 - FAIR_SHARE) * excess;
         let hunt = Hunt {
             beside: beside.clone(),
             probe,
@@ -125,7 +133,14 @@ impl Atlas {
         let mut last = Vec::new();
         for &sets in levels {
             let sizes: Vec<f64> = (-4..=4).map(|i| best + spacing * f64::from(i) / 3.0).collect();
-            last = self.distances(simulate, data, &hunt.beside, hunt.probe, &sizes, sets);
+            last = self.distances(
+                simulate,
+                data,
+                &hunt.beside,
+                hunt.probe,
+                &sizes,
+                &[0..sets, 0..sets],
+            );
             best = least(&last)?.1;
             spacing /= 3.0;
         }
@@ -140,7 +155,8 @@ impl Atlas {
     }
 
     /// Squared distances of the data from a hypothesis with a probe at some sizes beside it, each with its size; sizes at
-    /// which the robot crashes are left out.
+    /// which the robot crashes are left out. A distance is told along what two simulations leave: if these are different data
+    /// sets, their noise adds nothing to it on average.
     fn distances(
         &self,
         simulate: &Simulate<'_>,
@@ -148,16 +164,24 @@ impl Atlas {
         beside: &Hypothesis,
         probe: usize,
         sizes: &[f64],
-        sets: u64,
+        sets: &[Range<u64>; 2],
     ) -> Vec<(f64, f64)> {
-        let same_draws = self.declared_mean(sets);
         let others = beside.settings(self);
+        let same_draws = sets.clone().map(|sets| self.declared_mean(sets));
         let distance = |&size: &f64| {
             let mut settings = others.clone();
             settings.push(self.probes[probe].setting(size));
-            let found = self.simulated_plainly(simulate, &settings, sets)?;
-            let expected = found.moved(1.0, &same_draws, &self.null);
-            Some((self.white(data, &expected).norm_squared(), size))
+            let left = |i: usize| {
+                let found = self.simulated_plainly(simulate, &settings, sets[i].clone())?;
+                Some(self.white(data, &found.moved(1.0, &same_draws[i], &self.null)))
+            };
+            let first = left(0)?;
+            let square = if sets[0] == sets[1] {
+                first.norm_squared()
+            } else {
+                first.dot(&left(1)?)
+            };
+            Some((square, size))
         };
         sizes.par_iter().filter_map(distance).collect()
     }

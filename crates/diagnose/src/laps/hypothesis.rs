@@ -48,16 +48,26 @@ pub(super) struct Freedom {
     parameter: Option<usize>,
     /// A step over which its action is about linear.
     pub(super) step: f64,
+    /// It moves in whole multiples of this, which its step is then.
+    quantum: Option<f64>,
 }
 
 impl Freedom {
-    /// The same number over another step, if that is smaller; a step of nothing tells nothing.
-    pub(super) fn over(self, step: f64) -> Self {
-        let least = 1e-3 * self.step;
+    /// The same number over another step between a share of its own and its own.
+    pub(super) fn over(self, step: f64, least: f64) -> Self {
+        if self.quantum.is_some() {
+            return self;
+        }
         Self {
-            step: step.clamp(least, self.step),
+            step: step.clamp(least * self.step, self.step),
             ..self
         }
+    }
+
+    /// A move that it can make, the nearest to this one.
+    pub(super) fn possible(&self, moved: f64) -> f64 {
+        self.quantum
+            .map_or(moved, |quantum| (moved / quantum).round() * quantum)
     }
 
     /// The run whose size this is, if it is one run's.
@@ -234,7 +244,8 @@ impl Part {
             return freedoms;
         }
         for (i, &(parameter, step)) in probe.free.iter().enumerate() {
-            let step = step * self.stride;
+            let quantum = probe.quantum.filter(|_| i == 0);
+            let step = quantum.unwrap_or(step * self.stride);
             let parameter = Some(parameter);
             if i == 0 && self.shape == Shape::ByRun {
                 freedoms.extend((0..runs).map(|run| Freedom {
@@ -242,6 +253,7 @@ impl Part {
                     run: Some(run),
                     parameter,
                     step,
+                    quantum,
                 }));
             } else {
                 freedoms.push(Freedom {
@@ -249,6 +261,7 @@ impl Part {
                     run: None,
                     parameter,
                     step,
+                    quantum,
                 });
             }
         }
@@ -259,6 +272,7 @@ impl Part {
                 run: None,
                 parameter: None,
                 step: probe.free[0].1 / run_s,
+                quantum: None,
             });
         }
         freedoms

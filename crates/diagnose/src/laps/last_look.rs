@@ -26,6 +26,8 @@ const LOOKS: usize = 2;
 const LESS_CERTAIN: f64 = 2.0;
 /// Standard errors that a parabola reaches to either side.
 const REACH: f64 = 3.0;
+/// The least share of a step to look over: a step of nothing tells nothing.
+const LEAST: f64 = 1e-3;
 
 impl Atlas {
     /// Looks closely about a hypothesis whose numbers have these errors.
@@ -46,7 +48,7 @@ impl Atlas {
         let widest = hypothesis.freedoms(self);
         for _ in 0..LOOKS {
             let freedoms: Vec<Freedom> = (widest.iter().zip(&look.errors))
-                .map(|(widest, (_, error))| widest.over(REACH * error))
+                .map(|(widest, (_, error))| widest.over(REACH * error, LEAST))
                 .collect();
             let points = 2 * freedoms.len() as u64 + 1;
             let sets = self.enough(sets_at(points), points);

@@ -207,6 +207,7 @@ impl Atlas {
     ) -> Nearest {
         let target = white(scatter, &self.layout, data, &center.expectation);
         let (moves, covariance) = nearest(columns, &target, freedoms);
+        let moves = DVector::from_fn(moves.len(), |i, _| freedoms[i].possible(moves[i]));
         let left = left_of(columns, &target, &moves);
         let variances = covariance.diagonal() * (1.0 + center.doubt.error);
         Nearest {

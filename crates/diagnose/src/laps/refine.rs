@@ -110,6 +110,12 @@ impl Descent {
         }
     }
 
+    /// The score that another round like the last one would reach.
+    pub(super) fn within_reach(&self) -> f64 {
+        let progress = Some(self.progress).filter(|progress| progress.is_finite());
+        self.score + progress.unwrap_or(0.0).max(0.0)
+    }
+
     /// Whether nothing short of another effect would help, as far as a round saw.
     pub(super) fn leaves_far_too_much(&self) -> bool {
         (self.remainder).is_some_and(|left| left.omnibus_p() < HOPELESS_P)
@@ -210,7 +216,7 @@ impl Atlas {
             // The parabola should hold where the answer may lie, and be wide enough for the noise of its points not to
             // pass for information.
             let reach = (10.0 * errors[i]).max(moves[i].abs());
-            freedom.step = reach.clamp(0.2 * freedom.step, freedom.step);
+            *freedom = freedom.over(reach, 0.2);
         }
         let score = hypothesis.worth(gain) - self.price_of(&hypothesis);
         Some(Descent {

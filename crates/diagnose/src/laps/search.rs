@@ -292,7 +292,7 @@ impl Search<'_> {
             };
             let (best, hopeless, fits) = (first.score, is_hopeless(first), first.fits());
             let bar = best.max(reached);
-            alive.retain(|d| d.score >= bar - behind.max(share * bar));
+            alive.retain(|d| d.within_reach() >= bar - behind.max(share * bar));
             alive = self.without_repeats(alive);
             if fits {
                 let others = alive.split_off(FEW.min(alive.len()));

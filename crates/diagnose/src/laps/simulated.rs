@@ -41,12 +41,12 @@ impl Atlas {
         numbers: &[(usize, usize)],
         sets: u64,
     ) -> Vec<Option<White>> {
-        let same_draws = self.declared_mean(sets);
+        let same_draws = self.declared_mean(0..sets);
         numbers
             .par_iter()
             .map(|&(probe, number)| {
                 let setting = [self.probes[probe].step(number)];
-                let found = self.simulated_plainly(simulate, &setting, sets)?;
+                let found = self.simulated_plainly(simulate, &setting, 0..sets)?;
                 Some(self.white(&found, &same_draws))
             })
             .collect()
@@ -57,9 +57,9 @@ impl Atlas {
         &self,
         simulate: &Simulate<'_>,
         settings: &[Setting],
-        sets: u64,
+        sets: Range<u64>,
     ) -> Option<Expectation> {
-        let summaries = self.summaries(simulate, settings, 0..sets)?;
+        let summaries = self.summaries(simulate, settings, sets)?;
         Some(Expectation::of(summaries.iter(), self.alike))
     }
 

@@ -281,7 +281,8 @@ impl<'a> Search<'a> {
         self.sort();
         self.judge();
         if let (Some(best), None, None) = (self.found.first_mut(), self.step, &self.unlisted) {
-            *best = with_honest_error(&self.evidence, best.clone());
+            *best = with_honest_error(&self.evidence, best.clone())
+                .with_honest_errors(&self.evidence, &self.variants);
         }
     }
 

@@ -8,6 +8,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 use super::catalogue::{Shape, Variant};
 use super::evidence::{Evidence, Knob};
 use super::refine::{Fitted, hunt, jumps, knobs, refine};
+use super::repeat::repeats;
 use super::screen::{Normal, solve};
 
 /// How an effect's values go over the runs.
@@ -220,6 +221,27 @@ impl Refined {
             .map_or_else(|| self.settings.clone(), |fitted| fitted.settings)
     }
 
+    /// The same with errors at least as large as those of fits to simulated logs of it (a parametric bootstrap; Efron and
+    /// Tibshirani 1993): the filter is linear about a pose, and readings near edges do not count.
+    pub(crate) fn with_honest_errors(mut self, evidence: &Evidence<'_>, variants: &[Variant]) -> Self {
+        if self.knobs(variants).is_empty() {
+            return self;
+        }
+        let fits = repeats(evidence, &self.settings, |repeated| {
+            Some(self.refit(repeated, variants))
+        });
+        for (i, (setting, errors)) in self.settings.iter().zip(&mut self.standard_errors).enumerate() {
+            for (j, (value, error)) in numbers(setting).iter().zip(errors).enumerate() {
+                let square = |fit: &Vec<Setting>| (numbers(&fit[i])[j] - value).powi(2);
+                let mean = fits.iter().map(square).sum::<f64>() / fits.len() as f64;
+                if *error > 0.0 {
+                    *error = error.max(mean.sqrt());
+                }
+            }
+        }
+        self
+    }
+
     /// What was fitted beside another candidate, as one candidate of both.
     pub(crate) fn after(mut self, first: &Self) -> Self {
         let own = std::mem::replace(&mut self.standard_errors, first.standard_errors.clone());
@@ -297,6 +319,15 @@ fn refined(fitted: Fitted, base: f64, by: By) -> Refined {
         settings: fitted.settings,
         standard_errors,
         by,
+    }
+}
+
+/// The pattern's values, in the order of their standard errors; none where they go by run.
+fn numbers(setting: &Setting) -> Vec<f64> {
+    match &setting.pattern {
+        Pattern::Constant(values) => values.clone(),
+        Pattern::ByTime { start, per_s } => [start.as_slice(), per_s].concat(),
+        Pattern::ByRun(_) => Vec::new(),
     }
 }
 
