@@ -66,7 +66,7 @@ pub(crate) fn figures(outcomes: &[Outcome]) -> Vec<Figure> {
             "unlisted effects: refused or characterised in the right stage",
             "at least 90 %",
             share(
-                &of.all(|o| o.label.kind == Kind::Outside),
+                &of.all(|o| o.label.kind == Kind::Outside && !o.below_detection()),
                 Outcome::refused_or_characterised,
             ),
         ),
@@ -108,7 +108,7 @@ pub(crate) fn figures(outcomes: &[Outcome]) -> Vec<Figure> {
             apart(&places),
         ),
         figure(
-            "L1 singles below detection, left out above",
+            "sets below detection, left out above",
             "",
             outcomes
                 .iter()

@@ -7,7 +7,7 @@ use serde::Deserialize;
 use serde_json::Value;
 
 use crate::classes::{alike, same_set};
-use crate::labels::{Kind, Label, Level};
+use crate::labels::{Kind, Label};
 use crate::parameters::{ParameterError, comparable, errors, which_is_right};
 use crate::program::Timing;
 
@@ -115,8 +115,7 @@ impl Outcome {
 
     /// Whether the omnibus misses the effect, so that `faithful` is the right answer.
     pub(crate) fn below_detection(&self) -> bool {
-        self.label.kind == Kind::Single
-            && self.label.level == Level::L1
+        matches!(self.label.kind, Kind::Single | Kind::Outside)
             && self.trace.verdict == "faithful"
             && self.trace.residual.p.is_some_and(|p| p > 0.01)
     }
@@ -200,7 +199,7 @@ impl Outcome {
             Kind::Null => self.trace.verdict == "faithful",
             Kind::Single if self.label.by_run => self.by_run_right(),
             Kind::Single => self.below_detection() || self.in_class(),
-            Kind::Outside => self.refused_or_characterised(),
+            Kind::Outside => self.below_detection() || self.refused_or_characterised(),
             Kind::Pair => self.all_right(),
         }
     }

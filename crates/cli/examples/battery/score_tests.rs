@@ -1,6 +1,7 @@
 use serde_json::json;
 
 use super::*;
+use crate::labels::Level;
 use crate::labels::{Controller, Truth};
 
 fn outcome(kind: Kind, effects: &[&str], stages: &[&str], document: Value) -> Outcome {

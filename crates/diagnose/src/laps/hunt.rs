@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::atlas::{Atlas, Simulate};
@@ -94,6 +95,31 @@ impl Atlas {
     ) -> Option<Hypothesis> {
         let spacing = |_: f64, error: f64| 1.5 * error;
         self.hunt_each(simulate, data, hypothesis, &CLOSER[..1], spacing)
+    }
+
+    /// A hypothesis whose sizes that jump are those of a parabola over a wider neighbourhood, with errors of it: how rounding
+    /// falls on a reading or a speed makes likelihoods rough at a small scale, where one bottom is as good as the next.
+    pub(super) fn smoothed(
+        &self,
+        simulate: &Simulate<'_>,
+        data: &Expectation,
+        hypothesis: &Hypothesis,
+    ) -> Hypothesis {
+        let mut smooth = hypothesis.clone();
+        for (i, part) in hypothesis.parts.iter().enumerate() {
+            let Some(error) = part.held else { continue };
+            let mut beside = hypothesis.clone();
+            beside.parts.remove(i);
+            let size = part.values[0][self.probes[part.probe].size_index()];
+            let distances = |sizes: &[f64]| {
+                const SETS: u64 = 6;
+                self.distances(simulate, data, &beside, part.probe, sizes, &[0..SETS, 0..SETS])
+            };
+            if let Some((size, error)) = smooth_size(distances, size, error) {
+                smooth.parts[i] = Part::held(self, part.probe, size, error);
+            }
+        }
+        smooth
     }
 
     fn hunt_each(
@@ -190,4 +216,80 @@ impl Atlas {
 /// The least of some distances, with its size.
 fn least(found: &[(f64, f64)]) -> Option<(f64, f64)> {
     found.iter().copied().min_by(|a, b| a.0.total_cmp(&b.0))
+}
+
+/// The least of a parabola through squared distances at ever wider spaced sizes, and its standard error, once they rise enough
+/// to either side; `None` if they do so at once, or never.
+fn smooth_size(distances: impl Fn(&[f64]) -> Vec<(f64, f64)>, size: f64, error: f64) -> Option<(f64, f64)> {
+    /// Squared distance by which both ends must rise: five standard errors.
+    const RISE: f64 = 25.0;
+    const WIDER: f64 = 4.0;
+    const FLAT: f64 = 3.0;
+    const TIMES: i32 = 6;
+    const NARROW: f64 = 1e-3;
+    let first = (2.0 * error).max(NARROW * size);
+    for time in 0..TIMES {
+        let reach = first * WIDER.powi(time);
+        if reach >= size {
+            break;
+        }
+        let sizes: Vec<f64> = (-4..=4).map(|i| size + reach * f64::from(i) / 4.0).collect();
+        let found = distances(&sizes);
+        let (lowest, _) = least(&found)?;
+        let rises = |end: Option<&(f64, f64)>| end.is_some_and(|end| end.0 - lowest > RISE);
+        if found.len() == sizes.len() && rises(found.first()) && rises(found.last()) {
+            let (size, error) = vertex(&found, size, reach).filter(|_| time > 0)?;
+            // Distances that hardly rose at the spacing before may have a flat bottom as wide.
+            return Some((size, error.max(reach / WIDER / FLAT)));
+        }
+    }
+    None
+}
+
+/// The vertex of the parabola nearest to squared distances at sizes about a middle, and its standard error: that of the
+/// likelihood and that for how far the distances lie from the parabola.
+fn vertex(found: &[(f64, f64)], middle: f64, reach: f64) -> Option<(f64, f64)> {
+    let x = |(_, size): &(f64, f64)| (size - middle) / reach;
+    let design = DMatrix::from_fn(found.len(), 3, |i, power| x(&found[i]).powi(power as i32));
+    let heights = DVector::from_iterator(found.len(), found.iter().map(|found| found.0));
+    let covariance = (design.tr_mul(&design)).try_inverse()?;
+    let fit = &covariance * design.tr_mul(&heights);
+    let (slope, bend) = (fit[1], fit[2]);
+    if bend <= 0.0 {
+        return None;
+    }
+    let off = (heights - &design * &fit).norm_squared() / (found.len() as f64 - 3.0);
+    let rough = off * covariance[(1, 1)] / (2.0 * bend).powi(2);
+    let vertex = (-slope / (2.0 * bend)).clamp(-1.0, 1.0);
+    Some((middle + reach * vertex, reach * (1.0 / bend + rough).sqrt()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_rough_parabola_has_the_vertex_of_the_smooth_one() {
+        // A standard error of 0.5 about 30, with bottoms 0.01 apart.
+        let rough = |sizes: &[f64]| -> Vec<(f64, f64)> {
+            let at = |size: f64| ((size - 30.0) / 0.5).powi(2) + 2.0 * (600.0 * size).sin();
+            sizes.iter().map(|&size| (at(size), size)).collect()
+        };
+        let (size, error) = smooth_size(rough, 30.7, 0.003).unwrap();
+        assert!(
+            (size - 30.0).abs() < 2.0 * error && (0.45..0.7).contains(&error),
+            "{size} {error}"
+        );
+    }
+
+    #[test]
+    fn a_sharp_size_is_left_alone() {
+        let sharp = |sizes: &[f64]| {
+            sizes
+                .iter()
+                .map(|&size| (((size - 30.0) / 1e-3).powi(2), size))
+                .collect()
+        };
+        assert_eq!(smooth_size(sharp, 30.0, 3e-3), None);
+    }
 }

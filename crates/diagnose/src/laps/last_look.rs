@@ -38,6 +38,7 @@ impl Atlas {
         hypothesis: &Hypothesis,
         errors: &[(Freedom, f64)],
     ) -> LastLook {
+        let hypothesis = self.smoothed(simulate, data, hypothesis);
         let mut look = LastLook {
             found: hypothesis.clone(),
             errors: errors.to_vec(),

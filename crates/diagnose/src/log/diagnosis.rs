@@ -10,7 +10,7 @@ use super::catalogue::{Variant, unlisted_variants, variants};
 use super::decide::{Decided, decided};
 use super::evidence::Evidence;
 use super::filter::{MEASURED, Trace};
-use super::noise::{Factor, noises, with_honest_error};
+use super::noise::{Factor, noises, with_honest_error, with_memory};
 use super::pairs::pairs;
 use super::recut::recut;
 use super::refine::jumps;
@@ -283,6 +283,9 @@ impl<'a> Search<'a> {
         if let (Some(best), None, None) = (self.found.first_mut(), self.step, &self.unlisted) {
             *best = with_honest_error(&self.evidence, best.clone())
                 .with_honest_errors(&self.evidence, &self.variants);
+        }
+        if let Some(twin) = self.found.first().and_then(with_memory) {
+            self.found.insert(1, twin);
         }
     }
 

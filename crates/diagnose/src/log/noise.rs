@@ -132,6 +132,25 @@ impl Factor {
     }
 }
 
+/// An answer that holds a larger slip level, with slip that has a memory instead: over more than a few physics steps, correlation a
+/// of one step's slip with the last one's adds as much to the pose's covariance as a level of sqrt((1 + a) / (1 - a)), and the
+/// filter, which takes slip to be white, does not tell them apart. `None` for other answers.
+pub(crate) fn with_memory(answer: &Refined) -> Option<Refined> {
+    let place = answer.settings.iter().position(|s| s.spec.name == "slip-level")?;
+    let Pattern::Constant(values) = &answer.settings[place].pattern else {
+        return None;
+    };
+    let square = values[0] * values[0];
+    if square <= 1.0 {
+        return None;
+    }
+    let mut twin = answer.clone();
+    let correlation = (square - 1.0) / (square + 1.0);
+    twin.settings[place] = Setting::constant(find("slip-memory").ok()?, [correlation]);
+    twin.standard_errors[place][0] *= 4.0 * values[0] / (square + 1.0).powi(2);
+    Some(twin)
+}
+
 /// The same with the error of its noise effect's factor, if it has one, as large as fits to simulated logs of the answer
 /// scatter (a parametric bootstrap; Efron and Tibshirani 1993). Large noise takes the robot far from the pose about which the
 /// filter is linear: its innovations have heavy tails, and the likelihood is sharper than it should be.
@@ -162,4 +181,32 @@ pub(crate) fn with_honest_error(evidence: &Evidence<'_>, mut refined: Refined) -
         *error = error.max(values[0] * square.sqrt());
     }
     refined
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn memory_stands_for_a_level_that_adds_as_much_to_the_covariance() {
+        let of = |factor: f64| Refined {
+            settings: vec![Setting::constant(find("slip-level").unwrap(), [factor])],
+            standard_errors: vec![vec![0.1]],
+            gain: 100.0,
+            fitted: 1,
+            by: By::Constant,
+        };
+        let twin = with_memory(&of(2.0)).unwrap();
+        let Pattern::Constant(values) = &twin.settings[0].pattern else {
+            panic!("{twin:?}");
+        };
+        let level = |a: f64| ((1.0 + a) / (1.0 - a)).sqrt();
+        assert!((level(values[0]) - 2.0).abs() < 1e-12);
+        // The error follows by the derivative.
+        let h = 1e-6;
+        let slope = (level(values[0] + h) - level(values[0] - h)) / (2.0 * h);
+        assert!((slope * twin.standard_errors[0][0] - 0.1).abs() < 1e-6);
+        assert_eq!(twin.score(), of(2.0).score());
+        assert!(with_memory(&of(0.8)).is_none());
+    }
 }

@@ -125,6 +125,9 @@ pub(crate) fn pooled(assessment: &Assessment, count: usize) -> (DMatrix<f64>, DV
 
 /// The best size of an effect that jumps: trial sizes about `start`, then ever closer ones.
 pub(crate) fn hunt(evidence: &Evidence<'_>, setting: &Setting, spread: f64) -> Option<Fitted> {
+    /// Rounds at most, and log-likelihood that a round must gain for another one to follow.
+    const MOST: usize = 10;
+    const NOTHING: f64 = 0.5;
     let at = |size: f64| -> Option<(f64, f64)> {
         let log_likelihood = evidence.likelihood(&[Setting::constant(setting.spec, [size])])?;
         Some((size, log_likelihood))
@@ -134,7 +137,8 @@ pub(crate) fn hunt(evidence: &Evidence<'_>, setting: &Setting, spread: f64) -> O
     };
     let mut best = at(values[0])?;
     let mut spread = spread;
-    for _ in 0..rounds(setting) {
+    for round in 0..MOST {
+        let before = best.1;
         for side in [-1.0, -0.5, 0.5, 1.0] {
             let size = (best.0.min(values[0] * 4.0) + side * spread).clamp(param.low, param.high);
             if let Some(found) = at(size).filter(|found| found.1 > best.1) {
@@ -142,6 +146,9 @@ pub(crate) fn hunt(evidence: &Evidence<'_>, setting: &Setting, spread: f64) -> O
             }
         }
         spread *= 0.4;
+        if round + 1 >= rounds(setting) && best.1 - before < NOTHING {
+            break;
+        }
     }
     let knob = Knob {
         setting: 0,
@@ -157,6 +164,7 @@ pub(crate) fn hunt(evidence: &Evidence<'_>, setting: &Setting, spread: f64) -> O
     })
 }
 
+/// Rounds of a hunt at least.
 fn rounds(setting: &Setting) -> usize {
     if setting.spec.name == "command-delay" {
         2
