@@ -42,6 +42,14 @@ fn robots_as_declared_are_faithful() {
         says(&trace, "faithful", &[]);
         assert_eq!(trace["residual"]["significant"], false);
         assert_eq!(trace["error"]["before"], trace["error"]["after"]);
+        // It says how large an effect would have had to be.
+        let detectable = trace["detectable"].as_array().unwrap();
+        let gain = detectable.iter().find(|d| d["name"] == "reading-gain").unwrap();
+        let [below, above] = ["below", "above"].map(|side| gain[side].as_f64().unwrap());
+        assert!(
+            0.95 < below && below < 1.0 && 1.0 < above && above < 1.05,
+            "{gain}"
+        );
     }
 }
 

@@ -120,6 +120,8 @@ pub(crate) fn escape(text: &str) -> String {
 pub(crate) fn probability(p: f64) -> String {
     if p >= 0.001 {
         format!("{p:.3}")
+    } else if p == 0.0 {
+        "< 1e-300".into()
     } else {
         format!("{p:.0e}")
     }

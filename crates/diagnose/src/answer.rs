@@ -40,8 +40,8 @@ pub struct Explanation {
     pub gain: f64,
     /// Share of what exceeds the declared model's expectation that it explains.
     pub share: f64,
-    /// Probability of what remains by chance.
-    pub remainder_p: f64,
+    /// Probability of what remains by chance; `None` where it was not looked at.
+    pub remainder_p: Option<f64>,
     /// What remains, as laps tell it.
     pub remainder: Option<FourNumbers>,
 }
@@ -225,7 +225,7 @@ mod tests {
             score: 90.0,
             gain: 100.0,
             share: 1.0,
-            remainder_p: 0.5,
+            remainder_p: Some(0.5),
             remainder: None,
         };
         Answer {

@@ -26,26 +26,31 @@ impl Candidate {
 
     /// The effect with what tells it from others of its name (a sensor, a place), and its pattern.
     pub fn label(&self) -> String {
-        let (values, pattern) = match &self.setting.pattern {
-            Pattern::Constant(values) => (values, ""),
-            Pattern::ByRun(runs) => (&runs[0], ", by run"),
-            Pattern::ByTime { start, .. } => (start, ", by time"),
-        };
-        let spec = self.setting.spec;
-        let fixed: Vec<String> = (spec.params.iter().zip(values))
-            .filter(|(param, _)| param.neutral.is_none() && (spec.params.len() > 1 || *spec == UNLISTED))
-            .map(|(param, value)| match param.choices.get(*value as usize) {
-                Some(choice) if *spec == UNLISTED => format!("{} {choice}", param.name.replace('_', " ")),
-                Some(choice) => (*choice).to_owned(),
-                None if param.whole => format!("{} {value}", param.name),
-                None => format!("{} {value:.2}", param.name),
-            })
-            .collect();
-        let fixed = if fixed.is_empty() {
-            String::new()
-        } else {
-            format!(" ({})", fixed.join(", "))
-        };
-        format!("{}{fixed}{pattern}", spec.name)
+        label(&self.setting)
     }
+}
+
+/// An effect with what tells it from others of its name, and its pattern.
+pub(crate) fn label(setting: &Setting) -> String {
+    let (values, pattern) = match &setting.pattern {
+        Pattern::Constant(values) => (values, ""),
+        Pattern::ByRun(runs) => (&runs[0], ", by run"),
+        Pattern::ByTime { start, .. } => (start, ", by time"),
+    };
+    let spec = setting.spec;
+    let fixed: Vec<String> = (spec.params.iter().zip(values))
+        .filter(|(param, _)| param.neutral.is_none() && (spec.params.len() > 1 || *spec == UNLISTED))
+        .map(|(param, value)| match param.choices.get(*value as usize) {
+            Some(choice) if *spec == UNLISTED => format!("{} {choice}", param.name.replace('_', " ")),
+            Some(choice) => (*choice).to_owned(),
+            None if param.whole => format!("{} {value}", param.name),
+            None => format!("{} {value:.2}", param.name),
+        })
+        .collect();
+    let fixed = if fixed.is_empty() {
+        String::new()
+    } else {
+        format!(" ({})", fixed.join(", "))
+    };
+    format!("{}{fixed}{pattern}", spec.name)
 }

@@ -3,6 +3,7 @@
 mod answer;
 mod candidate;
 mod corners;
+mod detectable;
 mod error;
 mod laps;
 mod least_squares;
@@ -12,9 +13,8 @@ mod response_fit;
 pub use answer::{Answer, Cause, Explanation, Verdict};
 pub use candidate::Candidate;
 pub use corners::{Corners, other_cuts};
+pub use detectable::Detectable;
 pub use error::Error;
-pub use laps::{
-    Atlas, Baselines, Detectable, FourNumbers, LapDiagnosis, Quadratic, Rival, Simulate, separations,
-};
+pub use laps::{Atlas, Baselines, FourNumbers, LapDiagnosis, Quadratic, Rival, Simulate, separations};
 pub use log::{Channel, Decided, LogDiagnosis, LogRow, diagnose_logs, log_separation};
 pub use response_fit::{Estimate, ResponseFit};

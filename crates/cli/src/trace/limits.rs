@@ -57,21 +57,16 @@ pub(super) fn next_experiment(trace: &Trace) -> Vec<Block> {
 /// The smallest effects that would have been seen.
 pub(super) fn limits(trace: &Trace) -> Vec<Block> {
     let mut blocks: Vec<Block> = trace.remarks.iter().cloned().map(Block::Text).collect();
-    if trace.detectable.is_empty() {
-        blocks.push(Block::Text(
-            "With the robot's log each effect is seen from about the size at which it gains five standard deviations over the \
-             declared model; the intervals above are what a size is known to."
-                .into(),
-        ));
-        return blocks;
-    }
     let mut names: BTreeMap<&str, Vec<&Detectable>> = BTreeMap::new();
     for detectable in &trace.detectable {
         names.entry(detectable.spec.name).or_default().push(detectable);
     }
     let mut table = Table::new(
-        "Sizes from which a single effect shows in these laps in 95 of 100 cases (over its sensors, places and directions: \
-         the easiest to the hardest)",
+        format!(
+            "Sizes from which a single effect shows in these {} in 95 of 100 cases (over its sensors, places and directions: the \
+             easiest to the hardest)",
+            if trace.from_logs.is_some() { "logs" } else { "laps" }
+        ),
         &["effect", "parameter", "below", "above"],
     );
     let mut unseen = vec!["marker-offset (angle_rad)".to_owned()];
@@ -90,9 +85,21 @@ pub(super) fn limits(trace: &Trace) -> Vec<Block> {
         table.push([name.to_owned(), parameter, shown(below), shown(above)]);
     }
     blocks.push(Block::Table(table));
+    if trace.from_logs.is_some() {
+        blocks.push(Block::Text(
+            "A constant of the controller that is not as declared shows in every command, and a rounding of readings in every reading. \
+             Noise is judged by how much larger or smaller the innovations are: the intervals above say how well a factor is known. Of \
+             delays, lags, limits, steps and the like the table has the first size, of those that were looked at, which is seen."
+                .into(),
+        ));
+    }
+    let speed = if trace.from_logs.is_some() {
+        ""
+    } else {
+        ", and a controller's speed the same as both wheels'"
+    };
     blocks.push(Block::Text(format!(
-        "Not seen at any size that was looked at: {}. A shifted or turned world is the same as a shifted or turned camera, \
-         and a controller's speed the same as both wheels'.",
+        "Not seen at any size that was looked at: {}. A shifted or turned world is the same as a shifted or turned camera{speed}.",
         unseen.join(", ")
     )));
     blocks

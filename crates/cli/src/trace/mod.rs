@@ -143,7 +143,10 @@ impl Trace {
         let mut trace = Self {
             remarks: remarks(&recordings),
             laps_simulated: laps_simulated(&recordings, &atlas, purpose),
-            detectable: atlas.detectable(),
+            detectable: match &from_logs {
+                Some(found) => found.logs.detectable.clone(),
+                None => atlas.detectable(),
+            },
             experiments: Vec::new(),
             recordings,
             residual,

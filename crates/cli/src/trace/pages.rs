@@ -65,7 +65,7 @@ pub(crate) fn summary(trace: &Trace) -> String {
         (Verdict::Unexplained, _) | (_, None) => unexplained(trace),
         (v, Some(answer)) => {
             let what: Vec<String> = answer.effects.iter().map(describe).collect();
-            let rest = if v == Verdict::Explained && answer.remainder_p < 0.001 {
+            let rest = if v == Verdict::Explained && answer.remainder_p.is_some_and(|p| p < 0.001) {
                 " What remains is significant but small."
             } else if v == Verdict::PartlyExplained {
                 " What remains is significant and matters."
@@ -316,7 +316,7 @@ fn candidates(trace: &Trace) -> Vec<Block> {
             format!("{}{star}", e.label()),
             format!("{:.1}", e.gain),
             format!("{:.1} %", 100.0 * e.share),
-            probability(e.remainder_p),
+            e.remainder_p.map_or("-".into(), probability),
             sizes(e),
         ]);
     }

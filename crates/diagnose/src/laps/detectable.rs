@@ -1,27 +1,9 @@
 //! How large an effect must be to be seen.
 
-use sim::Spec;
-
 use super::atlas::{Atlas, White};
 use super::diagnosis::ALARM_SCORE;
 use super::screen::price;
-
-/// The smallest sizes of an effect, at one place or sensor, that these data show in 95 of 100 cases.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Detectable {
-    /// The effect.
-    pub spec: &'static Spec,
-    /// What tells it from others of its name.
-    pub label: String,
-    /// Name and unit of the parameter that sizes it.
-    pub parameter: &'static str,
-    /// Unit of that parameter.
-    pub unit: &'static str,
-    /// The largest size below the neutral one that is seen; `None` if none is, as far as was looked.
-    pub below: Option<f64>,
-    /// The smallest size above the neutral one that is seen.
-    pub above: Option<f64>,
-}
+use crate::detectable::{Detectable, QUANTILE_95};
 
 impl Atlas {
     /// The smallest sizes of all effects that these data show, probe by probe.
@@ -56,7 +38,6 @@ impl Atlas {
 
     /// Standard deviations of a signal that raises the alarm in 95 of 100 cases.
     fn needed(&self, numbers: usize) -> f64 {
-        const QUANTILE_95: f64 = 1.645;
         (2.0 * (ALARM_SCORE + price(numbers, self.layout.total_laps()))).sqrt() + QUANTILE_95
     }
 }

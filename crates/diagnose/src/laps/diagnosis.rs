@@ -32,9 +32,16 @@ const WORTH_BESIDE: f64 = 30.0;
 /// exact.
 const FAULTS: f64 = 0.001;
 
+/// Whether what an explanation leaves is as likely as that by chance.
+fn leaves_more_likely_than(explanation: &Explanation, p: f64) -> bool {
+    explanation
+        .remainder_p
+        .is_some_and(|remainder_p| remainder_p >= p)
+}
+
 /// Whether an explanation leaves nothing significant.
 fn fits(explanation: &Explanation) -> bool {
-    explanation.remainder_p >= SIGNIFICANT_P
+    leaves_more_likely_than(explanation, SIGNIFICANT_P)
 }
 
 /// Whether an explanation leaves nothing significant, or next to nothing.
@@ -44,14 +51,14 @@ fn suffices(explanation: &Explanation) -> bool {
     } else {
         ENOUGH
     };
-    fits(explanation) || explanation.share >= enough && explanation.remainder_p >= SURELY_P
+    fits(explanation) || explanation.share >= enough && leaves_more_likely_than(explanation, SURELY_P)
 }
 
 /// Whether nothing that is left calls for an effect that no descent finds.
 fn leaves_nothing_to_ask(explanation: &Explanation) -> bool {
     /// Probability of a remainder that, beside a poor share, makes one ask.
     const DOUBTFUL_P: f64 = 0.1;
-    suffices(explanation) && (explanation.share > MOST || explanation.remainder_p >= DOUBTFUL_P)
+    suffices(explanation) && (explanation.share > MOST || leaves_more_likely_than(explanation, DOUBTFUL_P))
 }
 
 /// What laps tell about a model.

@@ -106,20 +106,38 @@ impl Atlas {
         hypothesis: &Hypothesis,
     ) -> Hypothesis {
         let mut smooth = hypothesis.clone();
-        for (i, part) in hypothesis.parts.iter().enumerate() {
-            let Some(error) = part.held else { continue };
-            let mut beside = hypothesis.clone();
-            beside.parts.remove(i);
-            let size = part.values[0][self.probes[part.probe].size_index()];
+        for i in 0..smooth.parts.len() {
+            let Some(hunt) = self.hunt_of(&smooth, i) else {
+                continue;
+            };
             let distances = |sizes: &[f64]| {
                 const SETS: u64 = 6;
-                self.distances(simulate, data, &beside, part.probe, sizes, &[0..SETS, 0..SETS])
+                self.distances(
+                    simulate,
+                    data,
+                    &hunt.beside,
+                    hunt.probe,
+                    sizes,
+                    &[0..SETS, 0..SETS],
+                )
             };
-            if let Some((size, error)) = smooth_size(distances, size, error) {
-                smooth.parts[i] = Part::held(self, part.probe, size, error);
+            if let Some((size, error)) = smooth_size(distances, hunt.size, hunt.spacing) {
+                smooth.parts[i] = Part::held(self, hunt.probe, size, error);
             }
         }
         smooth
+    }
+
+    /// The hunt that ended with a part of a hypothesis, as far off as its size may be; `None` of other parts.
+    fn hunt_of(&self, hypothesis: &Hypothesis, part: usize) -> Option<Hunt> {
+        let mut beside = hypothesis.clone();
+        let part = beside.parts.remove(part);
+        Some(Hunt {
+            beside,
+            probe: part.probe,
+            size: part.values[0][self.probes[part.probe].size_index()],
+            spacing: part.held?,
+        })
     }
 
     fn hunt_each(
@@ -131,17 +149,11 @@ impl Atlas {
         spacing: impl Fn(f64, f64) -> f64,
     ) -> Option<Hypothesis> {
         let mut found = hypothesis.clone();
-        for (i, part) in hypothesis.parts.iter().enumerate() {
-            let Some(error) = part.held else { continue };
-            let mut beside = found.clone();
-            beside.parts.remove(i);
-            let size = part.values[0][self.probes[part.probe].size_index()];
-            let hunt = Hunt {
-                beside,
-                probe: part.probe,
-                size,
-                spacing: spacing(size, error),
+        for i in 0..found.parts.len() {
+            let Some(mut hunt) = self.hunt_of(&found, i) else {
+                continue;
             };
+            hunt.spacing = spacing(hunt.size, hunt.spacing);
             found.parts[i] = self.hunt_closer(simulate, data, &hunt, levels)?;
         }
         Some(found)

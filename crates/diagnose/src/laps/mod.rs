@@ -25,7 +25,6 @@ mod tests_of_fit;
 
 pub use atlas::{Atlas, Simulate};
 pub use baseline::Baselines;
-pub use detectable::Detectable;
 pub use diagnosis::LapDiagnosis;
 pub use separation::{Rival, separations};
 pub use tests_of_fit::{FourNumbers, Quadratic};

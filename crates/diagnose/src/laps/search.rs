@@ -394,7 +394,7 @@ impl Search<'_> {
                 gain: refined.fit.gain,
                 share: 1.0
                     - excess(refined.fit.residual.norm_squared()) / excess(self.residual.norm_squared()),
-                remainder_p: remainder.omnibus_p(),
+                remainder_p: Some(remainder.omnibus_p()),
                 remainder: Some(remainder),
             },
         }

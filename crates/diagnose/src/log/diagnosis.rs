@@ -8,6 +8,7 @@ use track::Side;
 
 use super::catalogue::{Variant, unlisted_variants, variants};
 use super::decide::{Decided, decided};
+use super::detectable::detectable;
 use super::evidence::Evidence;
 use super::filter::{MEASURED, Trace};
 use super::noise::{Factor, noises, with_honest_error, with_memory};
@@ -21,7 +22,7 @@ use super::search::{By, Lead, Refined, leads, price, pursue, shortlist, tail, to
 use super::steps::reading_step;
 use crate::answer::{ALTERNATIVE, indistinguishable};
 use crate::corners::{Corners, EXACT};
-use crate::{Answer, Candidate, Cause, Error, Explanation, Verdict};
+use crate::{Answer, Candidate, Cause, Detectable, Error, Explanation, Verdict};
 
 /// How white the filter's innovations of one measured number are.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -51,6 +52,8 @@ pub struct LogDiagnosis {
     pub corners: Corners,
     /// Control steps that were used.
     pub steps: usize,
+    /// How large effects on motion, readings, walls and camera must be to show in these logs.
+    pub detectable: Vec<Detectable>,
 }
 
 /// What the robot's logs say that the model lacks. Runs are rows in time order, from the run's start.
@@ -92,6 +95,7 @@ pub fn diagnose_logs(model: &Model, scene: &Scene, runs: &[&[LogRow]]) -> Result
     }
     let mut renewed = Search::new(declared.elsewhere(better), step)?;
     renewed.p = search.p;
+    renewed.detectable = std::mem::take(&mut search.detectable);
     renewed.found = search
         .found
         .iter()
@@ -124,6 +128,7 @@ struct Search<'a> {
     step: Option<f64>,
     step_gain: f64,
     steps: usize,
+    detectable: Vec<Detectable>,
     /// The last screening and its settings.
     screened: Option<(Vec<Setting>, Screened<'a>)>,
 }
@@ -157,6 +162,7 @@ impl<'a> Search<'a> {
             unlisted: None,
             step,
             step_gain,
+            detectable: Vec::new(),
             screened: None,
         })
     }
@@ -181,6 +187,7 @@ impl<'a> Search<'a> {
     /// Single effects; `None` if there is nothing to explain, else the leads at the declared model.
     fn alone(&mut self) -> Option<Vec<Lead>> {
         let leads = self.screen(&[])?.1.clone();
+        self.detectable = detectable(&leads, &self.variants, ALARM);
         let noise = noises(&self.evidence, &[], self.total());
         self.p = by_chance(&noise).min(least_p(&leads));
         if self.p >= ALARM {
@@ -521,7 +528,7 @@ impl<'a> Search<'a> {
                 score: certain[0].gain,
                 effects: certain,
                 share: 1.0,
-                remainder_p: self.p,
+                remainder_p: Some(self.p),
                 remainder: None,
             });
         }
@@ -563,6 +570,7 @@ impl<'a> Search<'a> {
             channels: self.channels,
             corners,
             steps: self.steps,
+            detectable: self.detectable,
         }
     }
 
@@ -593,12 +601,16 @@ impl<'a> Search<'a> {
                 gain: refined.gain,
                 fitted: errors.iter().filter(|error| **error > 0.0).count(),
             });
+        let is_best = self
+            .found
+            .first()
+            .is_none_or(|best| best.settings == refined.settings);
         Explanation {
             effects: certain.iter().cloned().chain(own).collect(),
             gain: refined.gain,
             score: refined.score(),
             share: refined.gain / (refined.gain + self.left_beside(refined)).max(1e-9),
-            remainder_p: self.remainder.1,
+            remainder_p: is_best.then_some(self.remainder.1),
             remainder: None,
         }
     }

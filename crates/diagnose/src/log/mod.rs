@@ -8,6 +8,7 @@
 mod catalogue;
 mod columns;
 mod decide;
+mod detectable;
 mod diagnosis;
 mod evidence;
 mod filter;

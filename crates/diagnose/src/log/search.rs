@@ -27,7 +27,9 @@ pub(crate) struct Lead {
     pub(crate) gain: f64,
     pub(crate) fitted: usize,
     /// Multiples of the columns: one list, or one for each run.
-    multiples: Vec<DVector<f64>>,
+    pub(crate) multiples: Vec<DVector<f64>>,
+    /// Squared signal, in standard errors, of each column at its step; none for sizes that have a pattern.
+    pub(crate) information: DVector<f64>,
 }
 
 impl Lead {
@@ -98,7 +100,9 @@ fn sums(normals: impl Iterator<Item = Normal>) -> Option<Normal> {
 }
 
 fn constant(variant: usize, normals: &[Normal]) -> Lead {
-    let solution = sums(normals.iter().cloned()).map(|sum| solve(&sum.left, &sum.right));
+    let sum = sums(normals.iter().cloned());
+    let information = (sum.as_ref()).map_or(DVector::zeros(0), |sum| sum.left.diagonal());
+    let solution = sum.map(|sum| solve(&sum.left, &sum.right));
     let (multiples, gain) = solution.map_or((DVector::zeros(0), 0.0), |s| (s.multiples, s.gain));
     Lead {
         variant,
@@ -106,6 +110,7 @@ fn constant(variant: usize, normals: &[Normal]) -> Lead {
         gain,
         fitted: multiples.len(),
         multiples: vec![multiples],
+        information,
     }
 }
 
@@ -127,6 +132,7 @@ fn by_time(variant: usize, normals: &[Normal]) -> Lead {
         gain: solution.gain,
         fitted: 2 * k,
         multiples: vec![solution.multiples],
+        information: DVector::zeros(0),
     }
 }
 
@@ -146,6 +152,7 @@ fn by_run(evidence: &Evidence<'_>, variant: usize, normals: &[Normal], runs: &[u
         gain: solutions.iter().map(|s| s.gain).sum(),
         fitted: solutions.iter().map(|s| s.multiples.len()).sum(),
         multiples: solutions.into_iter().map(|s| s.multiples).collect(),
+        information: DVector::zeros(0),
     }
 }
 
