@@ -2,8 +2,8 @@
 
 use anyhow::Result;
 use chart::{
-    Aspect, Axis, Color, Dash, Ellipse, Figure, Fill, GAP, Legend, Mark, Marker, Panel, Shape, Side, Style,
-    palette,
+    Aspect, Axis, Color, ColorMap, ColorScale, Dash, Ellipse, Figure, Fill, GAP, Legend, Mark, Marker, Panel,
+    Shape, Side, Style, palette,
 };
 use pdm::{Modes, Pdm, Projection, covariance_ellipse};
 use sim::Circuit;
@@ -90,6 +90,33 @@ pub(crate) fn map(title: impl Into<String>, marks: Vec<Mark>) -> Panel {
         aspect: Aspect::Equal,
         size_px: [520.0, 440.0],
         ..Panel::default()
+    }
+}
+
+/// A path over the walls, coloured by a value at each of its points, on a scale that reaches at least so far to either side.
+pub(crate) fn colored_path(
+    circuit: &Circuit,
+    points: Vec<[f64; 2]>,
+    values: Vec<f64>,
+    label: impl Into<String>,
+    least: f64,
+) -> Panel {
+    let most = values.iter().fold(least, |most, value| most.max(value.abs()));
+    let style = Style {
+        width_px: 5.0,
+        ..Style::color(Color::INK)
+    };
+    let marks = vec![
+        walls(&circuit.course),
+        Mark::new("", style, Shape::ColoredLine { points, values }),
+    ];
+    Panel {
+        colors: Some(ColorScale {
+            label: label.into(),
+            map: ColorMap::Diverging,
+            range: Some([-most, most]),
+        }),
+        ..map("", marks)
     }
 }
 

@@ -82,12 +82,17 @@ impl MeanLaps {
         mean(run.offsets_m().iter()).map_or(f64::NAN, |mean_m| rms(&self.mean_m, &mean_m))
     }
 
+    /// Mean lap of each simulated run's first so many laps, m.
+    fn run_means_m(&self, laps: usize) -> Vec<Vec<f64>> {
+        (self.runs_m.iter())
+            .filter_map(|run| mean(run.iter().take(laps)))
+            .collect()
+    }
+
     /// Standard error, gate by gate, of the mean lap of runs of so many laps each that this very model drove, m.
     pub(crate) fn standard_error_m(&self, laps: &[usize]) -> Vec<f64> {
         let fewest = laps.iter().copied().min().unwrap_or(1);
-        let means: Vec<Vec<f64>> = (self.runs_m.iter())
-            .filter_map(|run| mean(run.iter().take(fewest)))
-            .collect();
+        let means = self.run_means_m(fewest);
         let at = |gate: usize| {
             let off = |run: &Vec<f64>| (run[gate] - self.mean_m[gate]).powi(2);
             let variance = means.iter().map(off).sum::<f64>() / (means.len() as f64 - 1.0);
@@ -98,9 +103,8 @@ impl MeanLaps {
 
     /// What [`MeanLaps::distance_m`] is on average for a run of so many laps that this very model drove, m.
     pub(crate) fn floor_m(&self, laps: usize) -> f64 {
-        let distances: Vec<f64> = (self.runs_m.iter())
-            .filter_map(|run| mean(run.iter().take(laps)))
-            .map(|run| rms(&self.mean_m, &run))
+        let distances: Vec<f64> = (self.run_means_m(laps).iter())
+            .map(|run| rms(&self.mean_m, run))
             .collect();
         // Each run is a part of the mean that it is held against.
         let alone = distances.len() as f64 / (distances.len() as f64 - 1.0);

@@ -1,10 +1,10 @@
 //! The pictures of a trace.
 
-use chart::{Axis, Color, ColorMap, ColorScale, Dash, Figure, Interval, Mark, Shape, Style};
+use chart::{Axis, Color, Dash, Figure, Interval, Mark, Shape, Style};
 use track::Lap;
 
 use super::{MeanLaps, Trace, mean};
-use crate::figures::{MM, across, crossings, line, map, single, walls};
+use crate::figures::{MM, across, colored_path, crossings, line, map, single, walls};
 use crate::laps::SampledRun;
 
 /// The mean of all measured laps of the first recording, gate by gate, m.
@@ -30,21 +30,8 @@ pub(super) fn residual_map(trace: &Trace) -> Figure {
         .collect();
     points.push(points[0]);
     values.push(values[0]);
-    let most = values.iter().fold(0.1_f64, |m, v| m.max(v.abs()));
-    let style = Style {
-        width_px: 5.0,
-        ..Style::color(Color::INK)
-    };
-    let marks = vec![
-        walls(&circuit.course),
-        Mark::new("", style, Shape::ColoredLine { points, values }),
-    ];
-    let mut panel = map("", marks);
-    panel.colors = Some(ColorScale {
-        label: "measured less simulated, mm (left: positive)".into(),
-        map: ColorMap::Diverging,
-        range: Some([-most, most]),
-    });
+    let label = "measured less simulated, mm (left: positive)";
+    let panel = colored_path(circuit, points, values, label, 0.1);
     single(
         "Residual map",
         "The mean measured lap, coloured by its distance from the declared model's mean lap.",

@@ -2,13 +2,13 @@
 
 use std::f64::consts::TAU;
 
-use chart::{Axis, Color, ColorMap, ColorScale, Dash, Figure, Mark, Panel, Shape, Style};
+use chart::{Axis, Color, Dash, Figure, Mark, Panel, Shape};
 use diagnose::Cause;
 use sim::{Pattern, Vec2, unlisted_at, unlisted_on_floor};
 
 use super::Trace;
 use crate::experiments::{Block, Picture};
-use crate::figures::{crossings, line, map, single, walls};
+use crate::figures::{colored_path, crossings, line, single};
 
 /// What a claimed cause without a name does over what it depends on: a map of the floor, or a curve.
 pub(super) fn unnamed(trace: &Trace) -> Option<Block> {
@@ -51,21 +51,7 @@ fn on_floor(trace: &Trace, coefficients: &[f64], label: String) -> Figure {
     let values: Vec<f64> = (points.iter())
         .map(|[x, y]| unlisted_on_floor(coefficients, Vec2::new(*x, *y) - middle))
         .collect();
-    let most = values.iter().fold(1e-9_f64, |most, v| most.max(v.abs()));
-    let style = Style {
-        width_px: 5.0,
-        ..Style::color(Color::INK)
-    };
-    let marks = vec![
-        walls(&circuit.course),
-        Mark::new("", style, Shape::ColoredLine { points, values }),
-    ];
-    let mut panel = map("", marks);
-    panel.colors = Some(ColorScale {
-        label,
-        map: ColorMap::Diverging,
-        range: Some([-most, most]),
-    });
+    let panel = colored_path(circuit, points, values, label, 1e-9);
     single("A cause without a name", "Its size along the mean lap.", panel)
 }
 

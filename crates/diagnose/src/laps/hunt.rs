@@ -235,13 +235,16 @@ fn least(found: &[(f64, f64)]) -> Option<(f64, f64)> {
 fn smooth_size(distances: impl Fn(&[f64]) -> Vec<(f64, f64)>, size: f64, error: f64) -> Option<(f64, f64)> {
     /// Squared distance by which both ends must rise: five standard errors.
     const RISE: f64 = 25.0;
+    /// Times by which the sizes lie wider apart from one look to the next, and looks at most.
     const WIDER: f64 = 4.0;
-    const FLAT: f64 = 3.0;
-    const TIMES: i32 = 6;
+    const LOOKS: i32 = 6;
+    /// Share of a size over which the first look reaches at least.
     const NARROW: f64 = 1e-3;
+    /// Standard errors that fit into half a flat bottom.
+    const FLAT: f64 = 3.0;
     let first = (2.0 * error).max(NARROW * size);
-    for time in 0..TIMES {
-        let reach = first * WIDER.powi(time);
+    for look in 0..LOOKS {
+        let reach = first * WIDER.powi(look);
         if reach >= size {
             break;
         }
@@ -250,7 +253,7 @@ fn smooth_size(distances: impl Fn(&[f64]) -> Vec<(f64, f64)>, size: f64, error: 
         let (lowest, _) = least(&found)?;
         let rises = |end: Option<&(f64, f64)>| end.is_some_and(|end| end.0 - lowest > RISE);
         if found.len() == sizes.len() && rises(found.first()) && rises(found.last()) {
-            let (size, error) = vertex(&found, size, reach).filter(|_| time > 0)?;
+            let (size, error) = vertex(&found, size, reach).filter(|_| look > 0)?;
             // Distances that hardly rose at the spacing before may have a flat bottom as wide.
             return Some((size, error.max(reach / WIDER / FLAT)));
         }

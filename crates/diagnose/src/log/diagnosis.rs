@@ -11,7 +11,7 @@ use super::decide::{Decided, decided};
 use super::detectable::detectable;
 use super::evidence::Evidence;
 use super::filter::{MEASURED, Trace};
-use super::noise::{Factor, noises, with_honest_error, with_memory};
+use super::noise::{Factor, noises, with_honest_factor, with_memory};
 use super::pairs::pairs;
 use super::recut::recut;
 use super::refine::jumps;
@@ -288,7 +288,7 @@ impl<'a> Search<'a> {
         self.sort();
         self.judge();
         if let (Some(best), None, None) = (self.found.first_mut(), self.step, &self.unlisted) {
-            *best = with_honest_error(&self.evidence, best.clone())
+            *best = with_honest_factor(&self.evidence, best.clone())
                 .with_honest_errors(&self.evidence, &self.variants);
         }
         if let Some(twin) = self.found.first().and_then(with_memory) {

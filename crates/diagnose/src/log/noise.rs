@@ -154,7 +154,7 @@ pub(crate) fn with_memory(answer: &Refined) -> Option<Refined> {
 /// The same with the error of its noise effect's factor, if it has one, as large as fits to simulated logs of the answer
 /// scatter (a parametric bootstrap; Efron and Tibshirani 1993). Large noise takes the robot far from the pose about which the
 /// filter is linear: its innovations have heavy tails, and the likelihood is sharper than it should be.
-pub(crate) fn with_honest_error(evidence: &Evidence<'_>, mut refined: Refined) -> Refined {
+pub(crate) fn with_honest_factor(evidence: &Evidence<'_>, mut refined: Refined) -> Refined {
     let is_noise = |setting: &Setting| NOISES.contains(&setting.spec.name);
     let Some(place) = refined.settings.iter().position(is_noise) else {
         return refined;
