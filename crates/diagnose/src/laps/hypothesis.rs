@@ -243,9 +243,10 @@ impl Part {
         if self.held.is_some() {
             return freedoms;
         }
-        for (i, &(parameter, step)) in probe.free.iter().enumerate() {
+        let size = self.mean_size(atlas);
+        for (i, &(parameter, _)) in probe.free.iter().enumerate() {
             let quantum = probe.quantum.filter(|_| i == 0);
-            let step = quantum.unwrap_or(step * self.stride);
+            let step = quantum.unwrap_or(probe.step_at(i, size) * self.stride);
             let parameter = Some(parameter);
             if i == 0 && self.shape == Shape::ByRun {
                 freedoms.extend((0..runs).map(|run| Freedom {
@@ -271,7 +272,7 @@ impl Part {
                 part,
                 run: None,
                 parameter: None,
-                step: probe.free[0].1 / run_s,
+                step: probe.step_at(0, size) / run_s,
                 quantum: None,
             });
         }

@@ -24,9 +24,14 @@ pub(super) struct Probe {
     pub(super) quantum: Option<f64>,
     /// Whether its action jumps with its size.
     pub(super) jumps: bool,
+    /// Whether its size is a limit, which does the more the smaller it is and nothing where it is large.
+    limit: bool,
     /// Data sets simulated beforehand for each size.
     pub(super) sets: u64,
 }
+
+/// Share of a size over which its action is about linear.
+const STEP: f64 = 0.15;
 
 /// Data sets simulated beforehand for each size of a probe.
 pub(super) const PROBE_SETS: u64 = 4;
@@ -47,6 +52,7 @@ impl Probe {
             odd: false,
             quantum: None,
             jumps: false,
+            limit: false,
             sets: PROBE_SETS,
         }
     }
@@ -67,6 +73,16 @@ impl Probe {
     /// Which parameter sizes it.
     pub(super) fn size_index(&self) -> usize {
         self.free[0].0
+    }
+
+    /// A step of one of its free numbers over which its action is about linear, at a size.
+    pub(super) fn step_at(&self, number: usize, size: f64) -> f64 {
+        let step = self.free[number].1;
+        if self.limit && number == 0 {
+            step.min(STEP * size)
+        } else {
+            step
+        }
     }
 
     /// Whether it acts at a place of a wall; place and length are fitted with the size.
@@ -150,14 +166,15 @@ fn probe(name: &str, fixed: &[(&str, f64)], sizes: &[f64], free: &[(&str, f64)])
     for (key, value) in fixed {
         origin[index(key)] = *value;
     }
-    // What has no neutral value (a limit) does nothing where it is large.
     let largest = sizes.iter().fold(0.0_f64, |m, s| m.max(s.abs()));
-    let neutral = spec.params[size_index].neutral.unwrap_or(2.5 * largest);
+    let neutral = spec.params[size_index].neutral;
+    let limit = neutral.is_none();
+    let neutral = neutral.unwrap_or(2.5 * largest);
     origin[size_index] = neutral;
     let mut direction = vec![0.0; spec.params.len()];
     direction[size_index] = 1.0;
     let reach = sizes.iter().map(|s| (s - neutral).abs()).fold(0.0, f64::max);
-    let steps = [(size_index, 0.15 * reach)];
+    let steps = [(size_index, STEP * reach)];
     let free = steps
         .into_iter()
         .chain(free.iter().map(|(key, step)| (index(key), *step)))
@@ -172,6 +189,7 @@ fn probe(name: &str, fixed: &[(&str, f64)], sizes: &[f64], free: &[(&str, f64)])
         odd: false,
         quantum: None,
         jumps: JUMPS.contains(&name),
+        limit,
         sets: PROBE_SETS,
     }]
 }
@@ -193,7 +211,7 @@ fn vector(name: &str, keys: [&str; 2], sizes: &[f64]) -> Vec<Probe> {
             let (i, j) = (index(keys[0]), index(keys[1]));
             probe.direction.fill(0.0);
             (probe.direction[i], probe.direction[j]) = (a, b);
-            let step = 0.15 * sizes.iter().fold(0.0_f64, |m, s| m.max(s.abs()));
+            let step = STEP * sizes.iter().fold(0.0_f64, |m, s| m.max(s.abs()));
             probe.free = vec![(i, step), (j, step)];
             probes.push(probe);
         }
@@ -282,7 +300,10 @@ pub(super) fn probes() -> Vec<Probe> {
             .collect(),
         line("dead-band", &[0.034, 0.037, 0.04, 0.043, 0.046]),
         line("speed-step", &steps),
-        line("acceleration-limit", &[0.04, 0.08, 0.15, 0.3, 0.6, 1.5]),
+        line(
+            "acceleration-limit",
+            &[0.04, 0.08, 0.15, 0.18, 0.22, 0.3, 0.6, 1.5],
+        ),
         line("turn-scrub", &[0.05, 0.12, 0.22, 0.35]),
         line("battery-sag", &[-6e-5, 3e-5, 8e-5, 1.6e-4]),
         directed("floor-tilt", &[4e-4, 1.2e-3]),
