@@ -22,6 +22,9 @@ const ENOUGH: f64 = 0.98;
 const ALL_BUT: f64 = 0.995;
 /// Share that several effects, or one without a name, must explain to be claimed in part.
 const MOST: f64 = 0.9;
+/// Share up to which an explanation does not stand that leaves what is not likely, be it not significant: of weak signals chance
+/// alone explains as much.
+const TOO_LITTLE: f64 = 0.7;
 /// A cause without a name that explains as much as named ones but for this share comes first.
 const AS_GOOD: f64 = 0.01;
 /// Log-likelihood that each number of a further effect must gain.
@@ -56,9 +59,13 @@ fn suffices(explanation: &Explanation) -> bool {
 
 /// Whether nothing that is left calls for an effect that no descent finds.
 fn leaves_nothing_to_ask(explanation: &Explanation) -> bool {
-    /// Probability of a remainder that, beside a poor share, makes one ask.
+    suffices(explanation) && !is_doubtful(explanation, MOST)
+}
+
+/// Whether an explanation with a share below this leaves what is not likely either.
+fn is_doubtful(explanation: &Explanation, share: f64) -> bool {
     const DOUBTFUL_P: f64 = 0.1;
-    suffices(explanation) && (explanation.share > MOST || leaves_more_likely_than(explanation, DOUBTFUL_P))
+    explanation.share <= share && !leaves_more_likely_than(explanation, DOUBTFUL_P)
 }
 
 /// What laps tell about a model.
@@ -184,7 +191,11 @@ fn verdict_of(best: &Explanation) -> Verdict {
         return Verdict::Unexplained;
     }
     if suffices(best) {
-        return Verdict::Explained;
+        return if is_doubtful(best, TOO_LITTLE) {
+            Verdict::Unexplained
+        } else {
+            Verdict::Explained
+        };
     }
     let unnamed = best.effects.iter().any(|e| *e.setting.spec == UNLISTED);
     let enough = if unnamed || best.effects.len() > 1 {

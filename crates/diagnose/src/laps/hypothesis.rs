@@ -64,6 +64,17 @@ impl Freedom {
         }
     }
 
+    /// The same number over a step of about one and a half of its errors, as far as that is not another order of size.
+    pub(super) fn about(self, error: f64) -> Self {
+        if self.quantum.is_some() {
+            return self;
+        }
+        Self {
+            step: (1.5 * error).clamp(0.3 * self.step, 2.0 * self.step),
+            ..self
+        }
+    }
+
     /// A move that it can make, the nearest to this one.
     pub(super) fn possible(&self, moved: f64) -> f64 {
         self.quantum

@@ -76,6 +76,7 @@ impl Atlas {
             center,
             scatter,
             columns,
+            sides: sides.into_iter().map(|(_, down, up)| [down, up]).collect(),
         })
     }
 }
@@ -114,6 +115,8 @@ pub(super) struct Local {
     pub(super) center: Evaluated,
     pub(super) scatter: Vec<Scatter>,
     pub(super) columns: Vec<Column>,
+    /// What was simulated to either side of each number, or of the sizes of all runs, with the moves that lead there.
+    pub(super) sides: Vec<[(Vec<f64>, Evaluated); 2]>,
 }
 
 /// The action of one number: slope and curvature.
@@ -220,6 +223,82 @@ impl Atlas {
     }
 }
 
+/// Where a parabola through the log-likelihoods of a hypothesis and of a step to either side is highest.
+pub(super) struct Likeliest {
+    pub(super) moved: f64,
+    /// Standard error of the move.
+    pub(super) error: f64,
+    /// Log-likelihood that the move is hoped to gain.
+    pub(super) hoped: f64,
+    /// The hypothesis itself, without the price of its numbers.
+    pub(super) gain: f64,
+    pub(super) fit: Fit,
+}
+
+impl Atlas {
+    /// Where the likelihood itself is highest near a hypothesis of one number; `None` of more, at the end of its range, and where its
+    /// step spans so many errors that a parabola through means tells more. An effect on noise does more to the scatter than to
+    /// the means, whose parabolas then are mostly noise.
+    pub(super) fn likeliest(
+        &self,
+        simulate: &Simulate<'_>,
+        data: &Expectation,
+        hypothesis: &Hypothesis,
+        local: &Local,
+        freedom: &Freedom,
+        sets: u64,
+    ) -> Option<Likeliest> {
+        let [[(down, at_down), (up, at_up)]] = local.sides.as_slice() else {
+            return None;
+        };
+        let (&[down], &[up]) = (down.as_slice(), up.as_slice()) else {
+            return None;
+        };
+        if down == 0.0 || up == 0.0 {
+            return None;
+        }
+        let fit = |moved: f64, evaluated: &Evaluated| {
+            let there = hypothesis.moved(self, &[(*freedom, moved)]);
+            let more = self.evaluate_more(simulate, &there, evaluated.clone(), sets)?;
+            self.fit(data, &more)
+        };
+        let center = fit(0.0, &local.center)?;
+        let gained = |moved: f64, evaluated: &Evaluated| Some(fit(moved, evaluated)?.gain - center.gain);
+        let (moved, error, hoped) = highest((down, gained(down, at_down)?), (up, gained(up, at_up)?))?;
+        Some(Likeliest {
+            moved: freedom.possible(moved),
+            error,
+            hoped,
+            gain: center.gain + center.lost_to_doubt,
+            fit: center,
+        })
+    }
+}
+
+/// Where a parabola through nothing at 0 and two heights is highest, within two and a half times their distance: the place, its
+/// standard error if the heights are log-likelihoods, and its height; `None` where they tell little of a parabola, being far down.
+fn highest(down: (f64, f64), up: (f64, f64)) -> Option<(f64, f64, f64)> {
+    /// Log-likelihood that is far down.
+    const FAR: f64 = 50.0;
+    const MOST: f64 = 2.5;
+    let ((a, at_a), (b, at_b)) = (down, up);
+    if at_a.abs().max(at_b.abs()) > FAR {
+        return None;
+    }
+    let curvature = (at_b / b - at_a / a) / (b - a);
+    let slope = at_b / b - curvature * b;
+    let ends = [MOST * a, MOST * b];
+    let place = if curvature < 0.0 {
+        (-0.5 * slope / curvature).clamp(ends[0], ends[1])
+    } else if at_b > at_a {
+        b
+    } else {
+        a
+    };
+    let error = (-0.5 / curvature.min(-f64::MIN_POSITIVE)).sqrt().min(b - a);
+    Some((place, error, (slope * place + curvature * place * place).max(0.0)))
+}
+
 /// The moves that bring the parabolas nearest to the target, and their covariance.
 fn nearest(columns: &[Column], target: &White, freedoms: &[Freedom]) -> (DVector<f64>, DMatrix<f64>) {
     let count = columns.len();
@@ -313,6 +392,24 @@ mod tests {
     fn without_numbers_nothing_moves() {
         let (moves, covariance) = nearest(&[], &White::from_element(5, 1.0), &[]);
         assert!(moves.is_empty() && covariance.is_empty());
+    }
+
+    #[test]
+    fn a_normal_likelihood_is_highest_at_its_mean() {
+        let (mean, deviation) = (0.7, 0.4);
+        let at = |x: f64| -0.5 * (((x - mean) / deviation).powi(2) - (mean / deviation).powi(2));
+        let (place, error, height) = highest((-0.5, at(-0.5)), (0.6, at(0.6))).unwrap();
+        assert!((place - mean).abs() < 1e-12 && (error - deviation).abs() < 1e-12);
+        assert!((height - at(mean)).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_likelihood_without_a_top_in_sight_is_climbed() {
+        // Convex, and rising to a top far outside.
+        assert_eq!(highest((-1.0, 0.5), (1.0, 2.0)).unwrap().0, 1.0);
+        assert_eq!(highest((-1.0, -1.0), (1.0, 0.99)).unwrap().0, 2.5);
+        // The points are so far apart that means tell more.
+        assert!(highest((-1.0, -80.0), (1.0, -90.0)).is_none());
     }
 
     #[test]

@@ -8,7 +8,7 @@ use super::atlas::{Atlas, Simulate};
 use super::expectation::Expectation;
 use super::hypothesis::{Freedom, Hypothesis, Part, Shape};
 use super::likelihood::Fit;
-use super::parabola::{Column, Local, Nearest};
+use super::parabola::{Column, Likeliest, Local, Nearest};
 use super::screen::price;
 use super::simulated::Evaluated;
 use super::tests_of_fit::{FourNumbers, HOPELESS_P, SIGNIFICANT_P};
@@ -46,6 +46,9 @@ impl Round {
 /// Data sets simulated of every hypothesis that comes to the end, and of the best and others that explain nearly as much.
 const END_SETS: u64 = 16;
 pub(super) const CLOSE_SETS: u64 = 64;
+
+/// Errors by which a number may have moved that then is where it should be.
+const SETTLED: f64 = 0.7;
 
 /// Errors by which numbers may still be off where they are left as they are.
 const AT_REST: f64 = 0.25;
@@ -187,11 +190,36 @@ impl Atlas {
         let full = round == Round::Full;
         let points = 2 * freedoms.len() as u64 + 1;
         let sets = self.enough(round.sets_around(points), points);
-        let local = self.local(simulate, &hypothesis, &freedoms, sets)?;
+        let mut local = self.local(simulate, &hypothesis, &freedoms, sets)?;
+        if let [freedom] = freedoms.as_mut_slice() {
+            let sets = self.enough(round.sets(), 1);
+            if let Some(likeliest) = self.likeliest(simulate, data, &hypothesis, &local, freedom, sets) {
+                let Likeliest { moved, error, .. } = likeliest;
+                let hypothesis = hypothesis.moved(self, &[(*freedom, moved)]);
+                let gain = likeliest.gain + likeliest.hoped;
+                let score = hypothesis.worth(gain) - self.price_of(&hypothesis);
+                *freedom = freedom.about(error);
+                return Some(Descent {
+                    hypothesis,
+                    errors: vec![error],
+                    score,
+                    progress: score - descent.score,
+                    remainder: full.then(|| FourNumbers::new(&likeliest.fit.residual, &self.layout)),
+                    near: None,
+                    looks: looks + 1,
+                    holds: false,
+                    found: full && moved.abs() < SETTLED * error,
+                    end: None,
+                    freedoms,
+                });
+            }
+        }
+        local.sides.clear();
         let Local {
             center,
             scatter,
             columns,
+            ..
         } = &local;
         let nearest = self.nearest(data, center, scatter, columns, &freedoms);
         let gain = if round == Round::Rough {
@@ -388,7 +416,7 @@ impl Atlas {
     }
 
     /// What a hypothesis pays for its fitted numbers, for the choice of its probes, and for what robots hardly do.
-    fn price_of(&self, hypothesis: &Hypothesis) -> f64 {
+    pub(super) fn price_of(&self, hypothesis: &Hypothesis) -> f64 {
         /// A program's constants stay what they are while it runs: one in twenty that something drifts for another cause.
         const DRIFTING_PROGRAM: f64 = 3.0;
         let of_part = |part: &Part| {
@@ -421,9 +449,7 @@ pub(super) fn are_within_steps(moves: &DVector<f64>, freedoms: &[Freedom]) -> bo
 
 /// Whether numbers moved so little that there is nowhere left to go.
 fn is_settled(moves: &DVector<f64>, covariance: &DMatrix<f64>, freedoms: &[Freedom]) -> bool {
-    /// Errors by which a number may still have moved, and those by which it may if the points of its parabola lie so many
-    /// times farther out.
-    const SETTLED: f64 = 0.7;
+    /// Errors by which a number may still have moved if the points of its parabola lie so many times farther out.
     const WITHIN: (f64, f64) = (3.0, 4.0);
     (0..moves.len()).all(|i| {
         let (moved, error) = (moves[i].abs(), covariance[(i, i)].sqrt());

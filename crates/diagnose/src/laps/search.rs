@@ -60,7 +60,46 @@ const ROUNDS_OF_GROUPS: [(Round, f64, f64); 2] = [(Round::Rough, 30.0, 0.05), (R
 impl Search<'_> {
     /// The best single effects, tried to the end, best first.
     pub(super) fn singles(&self, screened: &[Screened]) -> Vec<Found> {
-        self.try_rounds(self.shortlist(screened).iter().map(|s| &s.hypothesis), &ROUNDS)
+        let listed = self.shortlist(screened);
+        let auditioned = self.auditioned(screened, &listed);
+        let starts = listed.into_iter().chain(auditioned);
+        self.try_rounds(starts.map(|s| &s.hypothesis), &ROUNDS)
+    }
+
+    /// Of a weak signal the effects beside a shortlist that are likeliest at the sizes that a screening found: by the noise of its
+    /// paths it tells little of them, and nothing of what they do to the scatter.
+    fn auditioned<'s>(&self, screened: &'s [Screened], listed: &[&'s Screened]) -> Vec<&'s Screened> {
+        /// Score up to which a signal is weak.
+        const WEAK: f64 = 100.0;
+        const HEARD: usize = 16;
+        const SETS: u64 = 8;
+        const TAKEN: usize = 4;
+        if screened.first().is_none_or(|best| best.score > WEAK) {
+            return Vec::new();
+        }
+        let spec = |s: &Screened| self.atlas.probes[s.hypothesis.parts[0].probe].spec;
+        let mut heard: Vec<&Screened> = Vec::new();
+        for candidate in screened {
+            let known = |other: &&Screened| spec(other) == spec(candidate);
+            let constant = candidate.hypothesis.parts[0].shape == Shape::Constant;
+            let new = !listed.iter().any(known) && !heard.iter().any(known);
+            if heard.len() < HEARD && constant && new && !self.jumps(&candidate.hypothesis) {
+                heard.push(candidate);
+            }
+        }
+        let score = |candidate: &'s Screened| {
+            let sets = self.atlas.enough(SETS, 1);
+            let simulated = (self.atlas).evaluate(self.simulate, &candidate.hypothesis, sets)?;
+            let fit = self.atlas.fit(self.data, &simulated)?;
+            Some((fit.gain - self.atlas.price_of(&candidate.hypothesis), candidate))
+        };
+        let mut scored: Vec<(f64, &Screened)> = heard.into_par_iter().filter_map(score).collect();
+        scored.sort_by(|a, b| b.0.total_cmp(&a.0));
+        scored
+            .into_iter()
+            .take(TAKEN)
+            .map(|(_, candidate)| candidate)
+            .collect()
     }
 
     /// Effects whose action jumps with their size, at the best of many sizes: derivatives say nothing of them.
