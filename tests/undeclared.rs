@@ -148,6 +148,16 @@ fn a_marker_far_ahead_is_there_in_every_run() {
 }
 
 #[test]
+fn quieter_sensors_are_found_where_the_mean_lap_says_next_to_nothing() {
+    share_signatures("braitenberg");
+    let scratch = Scratch::new();
+    Robot::with(Setting::constant(sim::find("reading-noise").unwrap(), [0.65])).record(&scratch, "set");
+    let found = trace(&scratch, "braitenberg", "set", &[]);
+    says(&found, "explained", &["reading-noise"]);
+    holds(&found["effects"][0], "factor", 0.65, 0.0);
+}
+
+#[test]
 fn a_listed_effect_under_another_name_is_named_from_logs() {
     let scratch = Scratch::new();
     limping().logged(&[3; 3]).record(&scratch, "set");

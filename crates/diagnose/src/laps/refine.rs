@@ -34,6 +34,14 @@ impl Round {
         }
     }
 
+    /// Data sets by which a hypothesis is compared with itself a step to either side.
+    fn sets_of_a_step(self) -> u64 {
+        match self {
+            Self::Rough => 6,
+            Self::Again | Self::Full => self.sets(),
+        }
+    }
+
     /// Data sets by which hypotheses are compared after the round; a rough one has no more than it looked by.
     fn sets(self) -> u64 {
         match self {
@@ -48,7 +56,7 @@ const END_SETS: u64 = 16;
 pub(super) const CLOSE_SETS: u64 = 64;
 
 /// Errors by which a number may have moved that then is where it should be.
-const SETTLED: f64 = 0.7;
+pub(super) const SETTLED: f64 = 0.7;
 
 /// Errors by which numbers may still be off where they are left as they are.
 const AT_REST: f64 = 0.25;
@@ -88,6 +96,8 @@ pub(super) struct Descent {
     looks: u32,
     /// Whether the moves stayed within the steps of the last look.
     holds: bool,
+    /// Whether it is where the likelihood was highest about it.
+    rests: bool,
     /// Whether there is nowhere left to descend to.
     found: bool,
     /// The hypothesis simulated as often as at the end, if it was.
@@ -107,6 +117,7 @@ impl Descent {
             near: None,
             looks: 0,
             holds: false,
+            rests: false,
             found: freedoms.is_empty(),
             end: None,
             freedoms,
@@ -160,6 +171,9 @@ impl Atlas {
         if descent.found {
             return Some(descent);
         }
+        if descent.rests {
+            return self.weigh(simulate, data, descent, round);
+        }
         let has_place = descent.hypothesis.has_place(self);
         let again = match round {
             Round::Rough => false,
@@ -172,6 +186,29 @@ impl Atlas {
         } else {
             self.look_around(simulate, data, descent, round)
         }
+    }
+
+    /// A descent that rests, simulated as often as the others of the round.
+    fn weigh(
+        &self,
+        simulate: &Simulate<'_>,
+        data: &Expectation,
+        descent: Descent,
+        round: Round,
+    ) -> Option<Descent> {
+        let center = self.evaluate(simulate, &descent.hypothesis, self.enough(round.sets(), 1))?;
+        let fit = self.fit(data, &center)?;
+        let gain = fit.gain + fit.lost_to_doubt;
+        let score = descent.hypothesis.worth(gain) - self.price_of(&descent.hypothesis);
+        let found = round == Round::Full;
+        Some(Descent {
+            score,
+            progress: score - descent.score,
+            remainder: Some(FourNumbers::new(&fit.residual, &self.layout)),
+            found,
+            end: found.then_some(center),
+            ..descent
+        })
     }
 
     fn look_around(
@@ -191,10 +228,16 @@ impl Atlas {
         let points = 2 * freedoms.len() as u64 + 1;
         let sets = self.enough(round.sets_around(points), points);
         let mut local = self.local(simulate, &hypothesis, &freedoms, sets)?;
+        let nearest = self.nearest(data, &local.center, &local.scatter, &local.columns, &freedoms);
         if let [freedom] = freedoms.as_mut_slice() {
-            let sets = self.enough(round.sets(), 1);
+            let sets = self.enough(round.sets_of_a_step(), 1);
             if let Some(likeliest) = self.likeliest(simulate, data, &hypothesis, &local, freedom, sets) {
-                let Likeliest { moved, error, .. } = likeliest;
+                let Likeliest {
+                    moved,
+                    error,
+                    is_near,
+                    ..
+                } = likeliest;
                 let hypothesis = hypothesis.moved(self, &[(*freedom, moved)]);
                 let gain = likeliest.gain + likeliest.hoped;
                 let score = hypothesis.worth(gain) - self.price_of(&hypothesis);
@@ -208,20 +251,15 @@ impl Atlas {
                     near: None,
                     looks: looks + 1,
                     holds: false,
-                    found: full && moved.abs() < SETTLED * error,
+                    rests: is_near,
+                    found: full && is_near,
                     end: None,
                     freedoms,
                 });
             }
         }
         local.sides.clear();
-        let Local {
-            center,
-            scatter,
-            columns,
-            ..
-        } = &local;
-        let nearest = self.nearest(data, center, scatter, columns, &freedoms);
+        let center = &local.center;
         let gain = if round == Round::Rough {
             let Fit {
                 gain,
@@ -253,6 +291,7 @@ impl Atlas {
             near: Some((local, moves)),
             looks: looks + 1,
             holds,
+            rests: false,
             found,
             end: None,
             remainder,
@@ -303,6 +342,7 @@ impl Atlas {
             holds: holds && are_within_steps(&moved, &freedoms),
             near: Some((local, moved)),
             looks,
+            rests: false,
             found,
             end,
             hypothesis,
