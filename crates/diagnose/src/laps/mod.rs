@@ -11,6 +11,7 @@ mod hunt;
 mod hypothesis;
 mod last_look;
 mod layout;
+mod likeliest;
 mod likelihood;
 mod pairs;
 mod parabola;

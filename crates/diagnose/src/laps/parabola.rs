@@ -8,7 +8,6 @@ use super::expectation::{Expectation, Scatter};
 use super::hypothesis::{Freedom, Hypothesis};
 use super::layout::Layout;
 use super::likelihood::Fit;
-use super::refine::SETTLED;
 use super::simulated::Evaluated;
 
 impl Atlas {
@@ -224,113 +223,6 @@ impl Atlas {
     }
 }
 
-/// Log-likelihood by which the ends of a step may differ from its middle for a parabola through the three to tell more than one
-/// through means, and that by which it is clear with few data sets that they differ by more.
-const FAR: f64 = 50.0;
-const VERY_FAR: f64 = 100.0;
-
-/// Where a parabola through the log-likelihoods of a hypothesis and of a step to either side is highest.
-pub(super) struct Likeliest {
-    pub(super) moved: f64,
-    /// Standard error of the move.
-    pub(super) error: f64,
-    /// Whether it is within that error.
-    pub(super) is_near: bool,
-    /// Log-likelihood that the move is hoped to gain.
-    pub(super) hoped: f64,
-    /// The hypothesis itself, without the price of its numbers.
-    pub(super) gain: f64,
-    pub(super) fit: Fit,
-}
-
-impl Atlas {
-    /// Where the likelihood itself is highest near a hypothesis of one number; `None` of more, at the end of its range, and where its
-    /// step spans so many errors that a parabola through means tells more. An effect on noise does more to the scatter than to
-    /// the means, whose parabolas then are mostly noise.
-    pub(super) fn likeliest(
-        &self,
-        simulate: &Simulate<'_>,
-        data: &Expectation,
-        hypothesis: &Hypothesis,
-        local: &Local,
-        freedom: &Freedom,
-        sets: u64,
-    ) -> Option<Likeliest> {
-        let [[(down, at_down), (up, at_up)]] = local.sides.as_slice() else {
-            return None;
-        };
-        let (&[down], &[up]) = (down.as_slice(), up.as_slice()) else {
-            return None;
-        };
-        if down == 0.0 || up == 0.0 {
-            return None;
-        }
-        let rough = self.fit(data, &local.center)?.gain;
-        let far = |side: &Evaluated| {
-            self.fit(data, side)
-                .is_none_or(|fit| (fit.gain - rough).abs() > VERY_FAR)
-        };
-        if far(at_down) || far(at_up) {
-            return None;
-        }
-        let fit = |moved: f64, evaluated: &Evaluated| {
-            let there = hypothesis.moved(self, &[(*freedom, moved)]);
-            let more = self.evaluate_more(simulate, &there, evaluated.clone(), sets)?;
-            self.fit(data, &more)
-        };
-        let center = fit(0.0, &local.center)?;
-        let gained = |moved: f64, evaluated: &Evaluated| Some(fit(moved, evaluated)?.gain - center.gain);
-        let top = top((down, gained(down, at_down)?), (up, gained(up, at_up)?))?;
-        Some(Likeliest {
-            moved: freedom.possible(top.place),
-            error: top.error,
-            is_near: top.between && top.place.abs() < SETTLED * top.error,
-            hoped: top.height,
-            gain: center.gain + center.lost_to_doubt,
-            fit: center,
-        })
-    }
-}
-
-/// The top of a parabola.
-struct Top {
-    place: f64,
-    /// Its standard error if the heights are log-likelihoods.
-    error: f64,
-    height: f64,
-    /// Whether it lies between the points.
-    between: bool,
-}
-
-/// The top of a parabola through nothing at 0 and two heights, or how far to go towards one that is not in sight; `None` where
-/// the heights are so far down that they tell little of a top.
-fn top(down: (f64, f64), up: (f64, f64)) -> Option<Top> {
-    /// Times the distance of the points by which a parabola is trusted.
-    const MOST: f64 = 2.5;
-    let ((a, at_a), (b, at_b)) = (down, up);
-    if at_a.abs().max(at_b.abs()) > FAR {
-        return None;
-    }
-    let curvature = (at_b / b - at_a / a) / (b - a);
-    let slope = at_b / b - curvature * b;
-    if curvature >= 0.0 {
-        let (end, height) = if at_b > at_a { (b, at_b) } else { (a, at_a) };
-        return Some(Top {
-            place: 2.0 * end,
-            error: b - a,
-            height: height.max(0.0),
-            between: false,
-        });
-    }
-    let place = (-0.5 * slope / curvature).clamp(MOST * a, MOST * b);
-    Some(Top {
-        place,
-        error: (-0.5 / curvature).sqrt().min(b - a),
-        height: slope * place + curvature * place * place,
-        between: (a..=b).contains(&place),
-    })
-}
-
 /// The moves that bring the parabolas nearest to the target, and their covariance.
 fn nearest(columns: &[Column], target: &White, freedoms: &[Freedom]) -> (DVector<f64>, DMatrix<f64>) {
     let count = columns.len();
@@ -424,27 +316,6 @@ mod tests {
     fn without_numbers_nothing_moves() {
         let (moves, covariance) = nearest(&[], &White::from_element(5, 1.0), &[]);
         assert!(moves.is_empty() && covariance.is_empty());
-    }
-
-    #[test]
-    fn a_normal_likelihood_is_highest_at_its_mean() {
-        let (mean, deviation) = (0.7, 0.4);
-        let at = |x: f64| -0.5 * (((x - mean) / deviation).powi(2) - (mean / deviation).powi(2));
-        let found = top((-0.5, at(-0.5)), (0.6, at(0.6))).unwrap();
-        assert!((found.place - mean).abs() < 1e-12 && (found.error - deviation).abs() < 1e-12);
-        assert!((found.height - at(mean)).abs() < 1e-12);
-        assert!(!found.between && top((-0.5, at(-0.5)), (0.8, at(0.8))).unwrap().between);
-    }
-
-    #[test]
-    fn a_likelihood_without_a_top_in_sight_is_climbed() {
-        // Convex, and rising to a top far outside.
-        for (down, up, place) in [(0.5, 2.0, 2.0), (2.0, 0.5, -2.0), (-1.0, 0.99, 2.5)] {
-            let found = top((-1.0, down), (1.0, up)).unwrap();
-            assert!(found.place == place && !found.between, "{}", found.place);
-        }
-        // The points are so far apart that means tell more.
-        assert!(top((-1.0, -80.0), (1.0, -90.0)).is_none());
     }
 
     #[test]

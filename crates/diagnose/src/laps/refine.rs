@@ -7,8 +7,9 @@ use sim::Stage;
 use super::atlas::{Atlas, Simulate};
 use super::expectation::Expectation;
 use super::hypothesis::{Freedom, Hypothesis, Part, Shape};
+use super::likeliest::Likeliest;
 use super::likelihood::Fit;
-use super::parabola::{Column, Likeliest, Local, Nearest};
+use super::parabola::{Column, Local, Nearest};
 use super::screen::price;
 use super::simulated::Evaluated;
 use super::tests_of_fit::{FourNumbers, HOPELESS_P, SIGNIFICANT_P};
@@ -218,47 +219,25 @@ impl Atlas {
         descent: Descent,
         round: Round,
     ) -> Option<Descent> {
+        let full = round == Round::Full;
+        let points = 2 * descent.freedoms.len() as u64 + 1;
+        let sets = self.enough(round.sets_around(points), points);
+        let mut local = self.local(simulate, &descent.hypothesis, &descent.freedoms, sets)?;
+        let Descent {
+            hypothesis, freedoms, ..
+        } = &descent;
+        let sets = self.enough(round.sets_of_a_step(), 1);
+        if let Some(likeliest) = self.likeliest(simulate, data, hypothesis, freedoms, &local, sets) {
+            return Some(self.climbed(descent, &likeliest, full));
+        }
+        local.sides.clear();
+        let nearest = self.nearest(data, &local.center, &local.scatter, &local.columns, freedoms);
         let Descent {
             hypothesis,
             mut freedoms,
             looks,
             ..
         } = descent;
-        let full = round == Round::Full;
-        let points = 2 * freedoms.len() as u64 + 1;
-        let sets = self.enough(round.sets_around(points), points);
-        let mut local = self.local(simulate, &hypothesis, &freedoms, sets)?;
-        let nearest = self.nearest(data, &local.center, &local.scatter, &local.columns, &freedoms);
-        if let [freedom] = freedoms.as_mut_slice() {
-            let sets = self.enough(round.sets_of_a_step(), 1);
-            if let Some(likeliest) = self.likeliest(simulate, data, &hypothesis, &local, freedom, sets) {
-                let Likeliest {
-                    moved,
-                    error,
-                    is_near,
-                    ..
-                } = likeliest;
-                let hypothesis = hypothesis.moved(self, &[(*freedom, moved)]);
-                let gain = likeliest.gain + likeliest.hoped;
-                let score = hypothesis.worth(gain) - self.price_of(&hypothesis);
-                *freedom = freedom.about(error);
-                return Some(Descent {
-                    hypothesis,
-                    errors: vec![error],
-                    score,
-                    progress: score - descent.score,
-                    remainder: full.then(|| FourNumbers::new(&likeliest.fit.residual, &self.layout)),
-                    near: None,
-                    looks: looks + 1,
-                    holds: false,
-                    rests: is_near,
-                    found: full && is_near,
-                    end: None,
-                    freedoms,
-                });
-            }
-        }
-        local.sides.clear();
         let center = &local.center;
         let gain = if round == Round::Rough {
             let Fit {
@@ -299,6 +278,28 @@ impl Atlas {
             freedoms,
             errors,
         })
+    }
+
+    /// A descent of one number moved to where the likelihood is highest about it.
+    fn climbed(&self, descent: Descent, to: &Likeliest, full: bool) -> Descent {
+        let mut freedoms = descent.freedoms;
+        let hypothesis = descent.hypothesis.moved(self, &[(freedoms[0], to.moved)]);
+        freedoms[0] = freedoms[0].about(to.error);
+        let score = hypothesis.worth(to.gain + to.hoped) - self.price_of(&hypothesis);
+        Descent {
+            score,
+            progress: score - descent.score,
+            remainder: full.then(|| FourNumbers::new(&to.fit.residual, &self.layout)),
+            near: None,
+            looks: descent.looks + 1,
+            holds: false,
+            rests: to.is_near,
+            found: full && to.is_near,
+            end: None,
+            errors: vec![to.error],
+            hypothesis,
+            freedoms,
+        }
     }
 
     fn look_again(
