@@ -5,6 +5,7 @@ use sim::{Pattern, Setting};
 use super::atlas::Atlas;
 use super::probe::Probe;
 use super::screen::{at, worth};
+use super::tests_of_fit::Quadratic;
 
 /// How an effect goes over the runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -346,6 +347,33 @@ impl Hypothesis {
         })
     }
 
+    /// Whether sizes that go over the runs, or in time, do so by more than chance, by their errors.
+    pub(super) fn patterns_show(&self, errors: &[(Freedom, f64)]) -> bool {
+        const CHANCE: f64 = 0.01;
+        let shows = |(number, part): (usize, &Part)| {
+            let own = errors.iter().filter(|(freedom, _)| freedom.part == number);
+            let values = |own: &[&(Freedom, f64)]| -> Vec<(f64, f64)> {
+                own.iter()
+                    .map(|(freedom, error)| (self.get(freedom), *error))
+                    .collect()
+            };
+            let p = match part.shape {
+                Shape::Constant => 0.0,
+                Shape::ByRun => {
+                    let sizes: Vec<_> = own.filter(|(freedom, _)| freedom.run.is_some()).collect();
+                    differ(&values(&sizes)).p
+                }
+                Shape::ByTime => {
+                    let change: Vec<_> = own.filter(|(freedom, _)| freedom.parameter.is_none()).collect();
+                    let square = |(value, error): (f64, f64)| (value / error).powi(2);
+                    Quadratic::new(values(&change).into_iter().map(square).sum(), 1).p
+                }
+            };
+            p < CHANCE
+        };
+        self.parts.iter().enumerate().all(shows)
+    }
+
     /// The same with the sizes of these parts where it has their effects at a size that was found by trying many.
     pub(super) fn with_held(&self, known: &[Part]) -> Self {
         let held = |part: &Part| {
@@ -454,6 +482,19 @@ impl Hypothesis {
     }
 }
 
+/// The squares by which values with errors differ from their weighted mean.
+fn differ(values: &[(f64, f64)]) -> Quadratic {
+    let weight = |error: f64| error.powi(-2);
+    let total: f64 = values.iter().map(|(_, error)| weight(*error)).sum();
+    let mean = values
+        .iter()
+        .map(|(value, error)| value * weight(*error))
+        .sum::<f64>()
+        / total;
+    let square = |(value, error): &(f64, f64)| ((value - mean) / error).powi(2);
+    Quadratic::new(values.iter().map(square).sum(), values.len().saturating_sub(1))
+}
+
 /// A value brought into its parameter's range: angles and places on a closed wall go round, others stop at the end.
 fn within(value: f64, param: &sim::Param) -> f64 {
     if param.name == "position" {
@@ -464,4 +505,18 @@ fn within(value: f64, param: &sim::Param) -> f64 {
         return (value + pi).rem_euclid(2.0 * pi) - pi;
     }
     value.clamp(param.low, param.high)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_differ_by_their_squares_about_the_weighted_mean() {
+        // 5 apart, with a variance of 5; a square of one freedom beyond 5.
+        let found = differ(&[(1.0, 1.0), (6.0, 2.0)]);
+        assert!((found.q - 5.0).abs() < 1e-12 && found.freedom == 1);
+        assert!((found.p - 0.025_347).abs() < 1e-5, "{}", found.p);
+        assert_eq!(differ(&[(3.0, 0.1)]).p, 1.0);
+    }
 }

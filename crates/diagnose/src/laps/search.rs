@@ -62,8 +62,28 @@ impl Search<'_> {
     pub(super) fn singles(&self, screened: &[Screened]) -> Vec<Found> {
         let listed = self.shortlist(screened);
         let auditioned = self.auditioned(screened, &listed);
-        let starts = listed.into_iter().chain(auditioned);
-        self.try_rounds(starts.map(|s| &s.hypothesis), &ROUNDS)
+        let starts: Vec<&Hypothesis> = (listed.into_iter().chain(auditioned))
+            .map(|s| &s.hypothesis)
+            .collect();
+        let found = self.try_rounds(starts.iter().copied(), &ROUNDS);
+        let shows = |found: &Found| found.hypothesis.patterns_show(&found.errors);
+        if found.first().is_none_or(shows) {
+            return found;
+        }
+        // Sizes that go over the runs by chance gain by chance, and kept others from being tried to the end.
+        let mut plain: Vec<Hypothesis> = Vec::new();
+        for start in starts {
+            let start = start
+                .without_patterns(self.atlas)
+                .unwrap_or_else(|| start.clone());
+            if !plain.iter().any(|other| other.probes() == start.probes()) {
+                plain.push(start);
+            }
+        }
+        let mut again = self.try_rounds(plain.iter(), &ROUNDS);
+        again.extend(found.into_iter().filter(shows));
+        sort(&mut again);
+        again
     }
 
     /// Of a weak signal the effects beside a shortlist that are likeliest at the sizes that a screening found: by the noise of its

@@ -23,7 +23,7 @@ pub struct Quadratic {
 }
 
 impl Quadratic {
-    fn new(q: f64, freedom: usize) -> Self {
+    pub(super) fn new(q: f64, freedom: usize) -> Self {
         let p = match ChiSquared::new(freedom as f64) {
             Ok(chi2) => chi2.sf(q),
             // No squares, no evidence.
