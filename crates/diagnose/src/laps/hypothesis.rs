@@ -351,22 +351,17 @@ impl Hypothesis {
     pub(super) fn patterns_show(&self, errors: &[(Freedom, f64)]) -> bool {
         const CHANCE: f64 = 0.01;
         let shows = |(number, part): (usize, &Part)| {
-            let own = errors.iter().filter(|(freedom, _)| freedom.part == number);
-            let values = |own: &[&(Freedom, f64)]| -> Vec<(f64, f64)> {
-                own.iter()
-                    .map(|(freedom, error)| (self.get(freedom), *error))
-                    .collect()
+            let numbers = |are: fn(&Freedom) -> bool| -> Vec<(f64, f64)> {
+                let own = errors.iter().filter(|(f, _)| f.part == number && are(f));
+                own.map(|(f, error)| (self.get(f), *error)).collect()
             };
             let p = match part.shape {
                 Shape::Constant => 0.0,
-                Shape::ByRun => {
-                    let sizes: Vec<_> = own.filter(|(freedom, _)| freedom.run.is_some()).collect();
-                    differ(&values(&sizes)).p
-                }
+                Shape::ByRun => differ(&numbers(|f| f.run.is_some())).p,
                 Shape::ByTime => {
-                    let change: Vec<_> = own.filter(|(freedom, _)| freedom.parameter.is_none()).collect();
-                    let square = |(value, error): (f64, f64)| (value / error).powi(2);
-                    Quadratic::new(values(&change).into_iter().map(square).sum(), 1).p
+                    let changes = numbers(|f| f.parameter.is_none());
+                    let squares = changes.iter().map(|(change, error)| (change / error).powi(2));
+                    Quadratic::new(squares.sum(), 1).p
                 }
             };
             p < CHANCE
@@ -513,7 +508,7 @@ mod tests {
 
     #[test]
     fn values_differ_by_their_squares_about_the_weighted_mean() {
-        // 5 apart, with a variance of 5; a square of one freedom beyond 5.
+        // 5 apart, of variance 1 + 4.
         let found = differ(&[(1.0, 1.0), (6.0, 2.0)]);
         assert!((found.q - 5.0).abs() < 1e-12 && found.freedom == 1);
         assert!((found.p - 0.025_347).abs() < 1e-5, "{}", found.p);
