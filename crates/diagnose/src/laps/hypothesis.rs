@@ -54,24 +54,13 @@ pub(super) struct Freedom {
 }
 
 impl Freedom {
-    /// The same number over another step between a share of its own and its own.
-    pub(super) fn over(self, step: f64, least: f64) -> Self {
+    /// The same number over another step, which is at least and at most such shares of its own.
+    pub(super) fn over(self, step: f64, (least, most): (f64, f64)) -> Self {
         if self.quantum.is_some() {
             return self;
         }
         Self {
-            step: step.clamp(least * self.step, self.step),
-            ..self
-        }
-    }
-
-    /// The same number over a step of about one and a half of its errors, as far as that is not another order of size.
-    pub(super) fn about(self, error: f64) -> Self {
-        if self.quantum.is_some() {
-            return self;
-        }
-        Self {
-            step: (1.5 * error).clamp(0.3 * self.step, 2.0 * self.step),
+            step: step.clamp(least * self.step, most * self.step),
             ..self
         }
     }

@@ -49,7 +49,7 @@ impl Atlas {
         let widest = hypothesis.freedoms(self);
         for _ in 0..LOOKS {
             let freedoms: Vec<Freedom> = (widest.iter().zip(&look.errors))
-                .map(|(widest, (_, error))| widest.over(REACH * error, LEAST))
+                .map(|(widest, (_, error))| widest.over(REACH * error, (LEAST, 1.0)))
                 .collect();
             let points = 2 * freedoms.len() as u64 + 1;
             let sets = self.enough(sets_at(points), points);

@@ -200,7 +200,7 @@ impl Atlas {
         let center = self.evaluate(simulate, &descent.hypothesis, self.enough(round.sets(), 1))?;
         let fit = self.fit(data, &center)?;
         let gain = fit.gain + fit.lost_to_doubt;
-        let score = descent.hypothesis.worth(gain) - self.price_of(&descent.hypothesis);
+        let score = self.score_of(&descent.hypothesis, gain);
         let found = round == Round::Full;
         Some(Descent {
             score,
@@ -261,9 +261,9 @@ impl Atlas {
             // The parabola should hold where the answer may lie, and be wide enough for the noise of its points not to
             // pass for information.
             let reach = (10.0 * errors[i]).max(moves[i].abs());
-            *freedom = freedom.over(reach, 0.2);
+            *freedom = freedom.over(reach, (0.2, 1.0));
         }
-        let score = hypothesis.worth(gain) - self.price_of(&hypothesis);
+        let score = self.score_of(&hypothesis, gain);
         Some(Descent {
             score,
             progress: score - descent.score,
@@ -284,8 +284,9 @@ impl Atlas {
     fn climbed(&self, descent: Descent, to: &Likeliest, full: bool) -> Descent {
         let mut freedoms = descent.freedoms;
         let hypothesis = descent.hypothesis.moved(self, &[(freedoms[0], to.moved)]);
-        freedoms[0] = freedoms[0].about(to.error);
-        let score = hypothesis.worth(to.gain + to.hoped) - self.price_of(&hypothesis);
+        // Points one and a half errors away tell most of a top.
+        freedoms[0] = freedoms[0].over(1.5 * to.error, (0.3, 2.0));
+        let score = self.score_of(&hypothesis, to.gain + to.hoped);
         Descent {
             score,
             progress: score - descent.score,
@@ -335,7 +336,7 @@ impl Atlas {
             let hypothesis = self.with_moves(&descent.hypothesis, &freedoms, &moves);
             (hypothesis, moved + moves, None)
         };
-        let score = hypothesis.worth(gain) - self.price_of(&hypothesis);
+        let score = self.score_of(&hypothesis, gain);
         Some(Descent {
             score,
             progress: score - descent.score,
@@ -446,7 +447,7 @@ impl Atlas {
         fit: Fit,
         evaluated: Evaluated,
     ) -> Settled {
-        let score = hypothesis.worth(fit.gain) - self.price_of(&hypothesis);
+        let score = self.score_of(&hypothesis, fit.gain);
         let refined = Refined {
             hypothesis,
             errors,
@@ -456,8 +457,13 @@ impl Atlas {
         Settled { refined, evaluated }
     }
 
+    /// What counts of a gain in log-likelihood, less what the hypothesis pays for it.
+    pub(super) fn score_of(&self, hypothesis: &Hypothesis, gain: f64) -> f64 {
+        hypothesis.worth(gain) - self.price_of(hypothesis)
+    }
+
     /// What a hypothesis pays for its fitted numbers, for the choice of its probes, and for what robots hardly do.
-    pub(super) fn price_of(&self, hypothesis: &Hypothesis) -> f64 {
+    fn price_of(&self, hypothesis: &Hypothesis) -> f64 {
         /// A program's constants stay what they are while it runs: one in twenty that something drifts for another cause.
         const DRIFTING_PROGRAM: f64 = 3.0;
         let of_part = |part: &Part| {

@@ -111,7 +111,7 @@ impl Search<'_> {
             let sets = self.atlas.enough(SETS, 1);
             let simulated = (self.atlas).evaluate(self.simulate, &candidate.hypothesis, sets)?;
             let fit = self.atlas.fit(self.data, &simulated)?;
-            Some((fit.gain - self.atlas.price_of(&candidate.hypothesis), candidate))
+            Some((self.atlas.score_of(&candidate.hypothesis, fit.gain), candidate))
         };
         let mut scored: Vec<(f64, &Screened)> = heard.into_par_iter().filter_map(score).collect();
         scored.sort_by(|a, b| b.0.total_cmp(&a.0));
