@@ -3,7 +3,7 @@
 use sim::{Effect, Machine, Moment, Param, Readings, Setting, Spec, Stage, Vec2, WheelSpeeds};
 
 use crate::support::Scratch;
-use crate::tracing::{GAINS, Robot, holds, never_a_listed_name, says, share_signatures, trace};
+use crate::tracing::{Robot, holds, never_a_listed_name, says, share_signatures, trace};
 
 /// A listed effect, written anew under another name.
 pub(crate) static LIMP: Spec = Spec {
@@ -84,13 +84,15 @@ static WARMING: Spec = Spec {
     build: || Box::new(Warming),
 };
 
+/// Time in which they come to 1 - 1/e of their final heat.
+const WARMING_S: f64 = 150.0;
+
 #[derive(Debug)]
 struct Warming;
 
 impl Effect for Warming {
     fn readings(&mut self, values: &[f64], now: &Moment, _machine: &Machine, readings: &mut Readings) {
-        const TIME_S: f64 = 150.0;
-        let warm = 1.0 - (-now.time_s / TIME_S).exp();
+        let warm = 1.0 - (-now.time_s / WARMING_S).exp();
         readings.iter_mut().for_each(|r| *r *= 1.0 + values[0] * warm);
     }
 }
@@ -122,17 +124,36 @@ fn a_battery_that_sags_is_sized_wherever_the_runs_began() {
 }
 
 #[test]
-fn sensors_that_warm_up_are_a_gain_that_changes_in_time() {
+fn sensors_that_warm_up_have_no_name_and_settle() {
+    const SHARE: f64 = 0.4;
     share_signatures("braitenberg");
     let scratch = Scratch::new();
-    Robot::with(Setting::constant(&WARMING, [0.4])).record(&scratch, "set");
+    Robot::with(Setting::constant(&WARMING, [SHARE])).record(&scratch, "set");
     let found = trace(&scratch, "braitenberg", "set", &[]);
-    assert_eq!(found["verdict"], "explained", "{found:#}");
+    says(&found, "explained", &["unlisted"]);
     let effect = &found["effects"][0];
-    assert_eq!(effect["by"], "time", "{found:#}");
-    let name = effect["name"].as_str().unwrap();
-    // No program's constant drifts.
-    assert!(GAINS.contains(&name) && name != "controller-gain", "{found:#}");
+    for (key, word) in [
+        ("stage", "sense"),
+        ("acts_on", "reading"),
+        ("depends_on", "time"),
+        ("basis", "settling"),
+    ] {
+        assert_eq!(effect[key], word, "{found:#}");
+    }
+    let coefficients = effect["coefficients"].as_array().unwrap().iter();
+    let [end, more, time_s]: [f64; 3] = coefficients
+        .map(|number| number.as_f64().unwrap())
+        .collect::<Vec<f64>>()
+        .try_into()
+        .unwrap();
+    for at_s in [100.0, 200.0, 400.0] {
+        let said = end + more * (-at_s / time_s).exp();
+        let true_share = SHARE * (1.0 - (-at_s / WARMING_S).exp());
+        assert!(
+            (said - true_share).abs() < 0.15 * SHARE,
+            "{at_s} s: {said}, {found:#}"
+        );
+    }
 }
 
 #[test]

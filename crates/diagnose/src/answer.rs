@@ -70,13 +70,19 @@ impl Explanation {
 /// Log-likelihood within which explanations are alternatives.
 pub(crate) const ALTERNATIVE: f64 = 5.0;
 
-/// How many of the first explanations, best first, data do not tell from the best: of as many effects, and not so far behind.
+/// How many of the first explanations, best first, data do not tell from the best: of as many effects, with a cause without a
+/// name if it has one, and not so far behind.
 pub(crate) fn indistinguishable<'a>(
     explanations: impl Iterator<Item = &'a Explanation> + Clone,
     behind: f64,
 ) -> usize {
     explanations.clone().next().map_or(0, |best| {
-        let alike = |e: &&Explanation| e.score > best.score - behind && e.effects.len() == best.effects.len();
+        let unnamed = |e: &Explanation| e.names().contains(&UNLISTED.name);
+        let alike = |e: &&Explanation| {
+            e.score > best.score - behind
+                && e.effects.len() == best.effects.len()
+                && unnamed(e) == unnamed(best)
+        };
         explanations.take_while(alike).count()
     })
 }
@@ -184,7 +190,7 @@ impl Answer {
 /// variance of the speed.
 fn are_stalls(explanation: &Explanation, slip_level: f64) -> bool {
     /// Share, or else standard errors, by which the slip may be off.
-    const OFF: (f64, f64) = (0.05, 3.0);
+    const OFF: (f64, f64) = (0.1, 3.0);
     let size = |name: &str| {
         let effect = explanation.effects.iter().find(|e| e.setting.spec.name == name)?;
         let Pattern::Constant(values) = &effect.setting.pattern else {

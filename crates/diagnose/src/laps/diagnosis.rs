@@ -99,6 +99,7 @@ impl Atlas {
             simulate,
             data: &data,
             residual: &residual,
+            runs,
         };
         let mut found = explain(&search, &screened);
         // Candidates share their draws, so that much of the error is common to them.
@@ -178,7 +179,17 @@ fn explain(search: &Search<'_>, screened: &[Screened]) -> Vec<Found> {
     if !first_is(&found, |best| suffices(best) || nearly_all(best)) {
         found = unless_named(found, search.unnamed());
     }
+    let claimed = |best: &Explanation| verdict_of(best) != Verdict::Unexplained && !has_no_name(best);
+    if let Some(best) = found.first().filter(|best| claimed(&best.explanation)) {
+        let settling = search.settling(best);
+        found = unless_steady(found, settling);
+    }
     found
+}
+
+/// Whether an explanation has a cause without a name.
+fn has_no_name(explanation: &Explanation) -> bool {
+    explanation.names().contains(&UNLISTED.name)
 }
 
 fn first_is(found: &[Found], holds: impl Fn(&Explanation) -> bool) -> bool {
@@ -197,8 +208,7 @@ fn verdict_of(best: &Explanation) -> Verdict {
             Verdict::Explained
         };
     }
-    let unnamed = best.effects.iter().any(|e| *e.setting.spec == UNLISTED);
-    let enough = if unnamed || best.effects.len() > 1 {
+    let enough = if has_no_name(best) || best.effects.len() > 1 {
         MOST
     } else {
         ENOUGH
@@ -254,6 +264,21 @@ fn unless_named(named: Vec<Found>, unnamed: Vec<Found>) -> Vec<Found> {
             }
         });
     let (mut list, rest) = if wins { (unnamed, named) } else { (named, unnamed) };
+    list.extend(rest);
+    list
+}
+
+/// What was seen to settle comes before a size that is always the same if it explains about as much.
+fn unless_steady(steady: Vec<Found>, settling: Vec<Found>) -> Vec<Found> {
+    let (Some(first), Some(best)) = (steady.first(), settling.first()) else {
+        return steady;
+    };
+    let wins = best.explanation.share > first.explanation.share - AS_GOOD;
+    let (mut list, rest) = if wins {
+        (settling, steady)
+    } else {
+        (steady, settling)
+    };
     list.extend(rest);
     list
 }

@@ -7,6 +7,7 @@ use super::atlas::{Atlas, Simulate, White};
 use super::hypothesis::{Hypothesis, Part};
 use super::probe::Probe;
 use super::screen::price;
+use super::steadiness::Settling;
 
 /// Values of [`UNLISTED`] before its coefficients: what it acts on, what it depends on, and the basis.
 const WORDS: usize = 3;
@@ -19,32 +20,40 @@ const AS_GOOD: f64 = 0.97;
 
 /// Every target with every dependence, as probes that have no path but only numbers to fit.
 pub(super) fn groups() -> Vec<Probe> {
-    let spec: &'static Spec = &UNLISTED;
-    let number = |i: usize, name: &str| spec.params[i].choices.iter().position(|n| *n == name);
     let mut probes = Vec::new();
-    for (target, step) in TARGETS {
+    for target in TARGETS {
         for (dependence, basis, scales) in DEPENDENCES {
-            let words = [number(0, target), number(1, dependence), number(2, basis)];
-            let [Some(target), Some(dependence), Some(basis)] = words else {
-                continue;
-            };
-            let mut origin = vec![target as f64, dependence as f64, basis as f64];
-            origin.resize(WORDS + scales.len(), 0.0);
             // A constant has a name of its own: only what varies counts.
-            let first = usize::from(dependence_has_constant(basis, spec));
-            let free = (first..scales.len())
-                .map(|i| (WORDS + i, step * scales[i]))
-                .collect();
-            probes.push(Probe::group(spec, origin, free));
+            let first = usize::from(basis == "polynomial");
+            probes.extend(group(target, [dependence, basis], scales, first));
         }
+        probes.extend(group(target, ["time", SETTLING], &[1.0, 1.0], 0));
     }
     probes
 }
 
-/// Whether the first coefficient of a basis is a constant.
-fn dependence_has_constant(basis: usize, spec: &Spec) -> bool {
-    spec.params[2].choices[basis] == "polynomial"
+/// A target with a dependence on a basis whose coefficients, from the first that is free on, have such steps.
+fn group(
+    (target, step): (&str, f64),
+    [dependence, basis]: [&str; 2],
+    scales: &[f64],
+    first: usize,
+) -> Option<Probe> {
+    let spec: &'static Spec = &UNLISTED;
+    let number = |i: usize, word: &str| {
+        let place = spec.params[i].choices.iter().position(|name| *name == word);
+        place.map(|place| place as f64)
+    };
+    let mut origin = vec![number(0, target)?, number(1, dependence)?, number(2, basis)?];
+    origin.resize(WORDS + scales.len(), 0.0);
+    let free = (first..scales.len())
+        .map(|i| (WORDS + i, step * scales[i]))
+        .collect();
+    Some(Probe::group(spec, origin, free))
 }
+
+/// The basis of what settles while a run goes on. Only what was seen to settle is tried with it.
+const SETTLING: &str = "settling";
 
 /// What a cause may act on, with a step over which its action is about linear: rad/s, a share, m/s, counts, m.
 const TARGETS: [(&str, f64); 7] = [
@@ -71,13 +80,21 @@ const DEPENDENCES: [(&str, &str, &[f64]); 5] = [
     ("time", "polynomial", &[1.0, 7e-4, 5e-7]),
 ];
 
+impl Probe {
+    /// Whether it is a group of what settles while a run goes on.
+    fn settles(&self) -> bool {
+        let basis = || self.spec.params[2].choices[self.origin()[2] as usize];
+        *self.spec == UNLISTED && basis() == SETTLING
+    }
+}
+
 impl Atlas {
     /// The groups that explain a residual best at the sizes that linear algebra gives them: the best and those that are as
     /// good with fewer coefficients.
     pub(super) fn screen_groups(&self, simulate: &Simulate<'_>, residual: &White) -> Vec<Hypothesis> {
         const MOST: usize = 3;
         let all: Vec<usize> = (0..self.probes.len())
-            .filter(|&probe| *self.probes[probe].spec == UNLISTED)
+            .filter(|&probe| *self.probes[probe].spec == UNLISTED && !self.probes[probe].settles())
             .collect();
         let jobs: Vec<(usize, usize)> = (all.iter())
             .flat_map(|&probe| (0..self.probes[probe].free.len()).map(move |i| (probe, i)))
@@ -110,6 +127,33 @@ impl Atlas {
             .filter(|f| f.0 > 0.3 * most)
             .map(|f| f.2)
             .collect()
+    }
+
+    /// What settles like this and explains a residual best at the sizes that linear algebra gives, target by target.
+    pub(super) fn screen_settling(
+        &self,
+        simulate: &Simulate<'_>,
+        residual: &White,
+        settling: &Settling,
+    ) -> Vec<Hypothesis> {
+        const MOST: usize = 2;
+        let jobs: Vec<(usize, usize)> = (0..self.probes.len())
+            .filter(|&probe| self.probes[probe].settles())
+            .map(|probe| (probe, 0))
+            .collect();
+        let actions = self.actions(simulate, &jobs, GROUP_SETS);
+        let mut found: Vec<(f64, Hypothesis)> = (jobs.iter().zip(&actions))
+            .filter_map(|(&(probe, _), action)| {
+                let (end, gain) = solve(&[action.as_ref()?], residual);
+                let multiples = [end[0], settling.more * end[0]];
+                let mut part = Part::group(&self.probes[probe], probe, &multiples);
+                part.values[0].push(settling.time_s);
+                Some((gain, Hypothesis::of(part)))
+            })
+            .collect();
+        found.sort_by(|a, b| b.0.total_cmp(&a.0));
+        found.truncate(MOST);
+        found.into_iter().map(|f| f.1).collect()
     }
 }
 

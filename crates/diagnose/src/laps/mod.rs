@@ -21,6 +21,7 @@ mod screen;
 mod search;
 mod separation;
 mod simulated;
+mod steadiness;
 mod summary;
 mod tests_of_fit;
 

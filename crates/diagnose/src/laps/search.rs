@@ -32,6 +32,8 @@ pub(super) struct Search<'a> {
     pub(super) simulate: &'a Simulate<'a>,
     pub(super) data: &'a Expectation,
     pub(super) residual: &'a White,
+    /// The laps of each run.
+    pub(super) runs: &'a [Vec<track::Lap>],
 }
 
 /// Rounds of a descent, each with the log-likelihood, and the share of the best one's, by which what lies behind then does
@@ -316,6 +318,39 @@ impl Search<'_> {
     /// Causes without a name: the groups of basis functions that explain most with fewest coefficients, tried to the end.
     pub(super) fn unnamed(&self) -> Vec<Found> {
         let starts = self.atlas.screen_groups(self.simulate, self.residual);
+        self.try_rounds(starts.iter(), &ROUNDS_OF_GROUPS)
+    }
+
+    /// An explanation with a cause without a name in place of an effect whose size is not steady but settles while a run goes
+    /// on, tried to the end.
+    pub(super) fn settling(&self, best: &Found) -> Vec<Found> {
+        const SETS: u64 = 10;
+        let parts = &best.hypothesis.parts;
+        let of_part = |part: usize| {
+            let settling = self
+                .atlas
+                .settling(self.simulate, self.runs, &best.hypothesis, part)?;
+            Some((part, settling))
+        };
+        let Some((part, settling)) = (0..parts.len())
+            .filter_map(of_part)
+            .filter(|(_, settling)| settling.p() < SIGNIFICANT_P)
+            .max_by(|a, b| a.1.sigmas.abs().total_cmp(&b.1.sigmas.abs()))
+        else {
+            return Vec::new();
+        };
+        let mut others = best.hypothesis.clone();
+        others.parts.remove(part);
+        let left = if others.parts.is_empty() {
+            Some(self.residual.clone())
+        } else {
+            let evaluated = self.atlas.evaluate(self.simulate, &others, SETS);
+            evaluated.map(|evaluated| self.atlas.white(self.data, &evaluated.expectation))
+        };
+        let starts = left.map_or_else(Vec::new, |left| {
+            self.atlas.screen_settling(self.simulate, &left, &settling)
+        });
+        let starts: Vec<Hypothesis> = starts.iter().map(|start| others.with(start)).collect();
         self.try_rounds(starts.iter(), &ROUNDS_OF_GROUPS)
     }
 

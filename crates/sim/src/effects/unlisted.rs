@@ -17,7 +17,7 @@ const ACTS_ON: [&str; 9] = [
     "camera y",
 ];
 const DEPENDS_ON: [&str; 7] = ["constant", "heading", "gate", "place", "speed", "turn", "time"];
-const BASES: [&str; 2] = ["polynomial", "harmonics"];
+const BASES: [&str; 3] = ["polynomial", "harmonics", "settling"];
 
 /// Values before the coefficients.
 const WORDS: usize = 3;
@@ -30,9 +30,9 @@ const WORDS: usize = 3;
 ///
 /// The variable u is 1 (constant), the heading (rad), the lap's fraction by gates times 2 pi (rad), the mean of the
 /// commanded wheel speeds or their difference, right less left (m/s), or the time since the run began (s). The
-/// polynomial is c0 + c1 u + c2 u^2 + ..., the harmonics c0 cos u + c1 sin u + c2 cos 2u + c3 sin 2u + .... A place on
-/// the floor has two coordinates (x, y) from the arena's middle (m), and for it either basis stands for the monomials 1, x, y,
-/// x^2, xy, y^2, ....
+/// polynomial is c0 + c1 u + c2 u^2 + ..., the harmonics c0 cos u + c1 sin u + c2 cos 2u + c3 sin 2u + ..., the settling
+/// c0 + c1 exp(-u / c2). A place on the floor has two coordinates (x, y) from the arena's middle (m), and for it any basis
+/// stands for the monomials 1, x, y, x^2, xy, y^2, ....
 ///
 /// It is not in [`super::EFFECTS`], because it is no candidate by itself; [`super::find`] knows it.
 pub static UNLISTED: Spec = Spec {
@@ -80,6 +80,7 @@ pub fn unlisted_at(values: &[f64], variable: f64) -> f64 {
     let coefficients = &values[WORDS..];
     match word(&BASES, values[2]) {
         "harmonics" => harmonics(coefficients, variable),
+        "settling" => settling(coefficients, variable),
         _ => coefficients.iter().rev().fold(0.0, |sum, c| sum * variable + c),
     }
 }
@@ -99,6 +100,15 @@ fn harmonics(coefficients: &[f64], u: f64) -> f64 {
         pair[0] * cos + pair.get(1).map_or(0.0, |c| c * sin)
     };
     coefficients.chunks(2).enumerate().map(term).sum()
+}
+
+/// Nothing but the first coefficient where the third, the scale of the decay, is missing or not positive.
+fn settling(coefficients: &[f64], u: f64) -> f64 {
+    match *coefficients {
+        [end, more, scale, ..] if scale > 0.0 => end + more * (-u / scale).exp(),
+        [end, ..] => end,
+        [] => 0.0,
+    }
 }
 
 /// Monomials by rising degree, and in each degree by falling power of x.

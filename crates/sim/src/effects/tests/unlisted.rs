@@ -1,7 +1,7 @@
 use track::Vec2;
 
 use super::super::testing::{active, declared, moment, scene, silent, steps, with};
-use super::super::{EFFECTS, Setting, UNLISTED, find};
+use super::super::{EFFECTS, Setting, UNLISTED, find, unlisted_at};
 use crate::{Error, Pose, WheelSpeeds};
 
 /// Value of a word of one of the three choices.
@@ -69,6 +69,21 @@ fn camera_polynomial_over_the_floor() {
     let (x, y) = (0.2, 0.1);
     let expected = 0.7 + 1.0 + 2.0 * x + 3.0 * y + 4.0 * x * x + 5.0 * x * y + 6.0 * y * y;
     assert!((seen - Vec2::new(0.9, expected)).length() < 1e-12, "{seen:?}");
+}
+
+#[test]
+fn what_settles_has_decayed_to_a_share_of_e_after_its_time() {
+    let at = |coefficients: &[f64], time_s| {
+        unlisted_at(&values(["reading", "time", "settling"], coefficients), time_s)
+    };
+    assert_eq!(at(&[0.1, -0.3, 150.0], 0.0), 0.1 - 0.3);
+    assert!((at(&[0.1, -0.3, 150.0], 150.0) - (0.1 - 0.3 / std::f64::consts::E)).abs() < 1e-15);
+    assert!((at(&[0.1, -0.3, 150.0], 1e6) - 0.1).abs() < 1e-15);
+    // Without a scale there is no decay.
+    assert_eq!(
+        [at(&[], 1.0), at(&[0.1], 1.0), at(&[0.1, -0.3, 0.0], 1.0)],
+        [0.0, 0.1, 0.1]
+    );
 }
 
 #[test]
