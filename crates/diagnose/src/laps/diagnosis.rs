@@ -161,7 +161,12 @@ fn explain(search: &Search<'_>, screened: &[Screened]) -> Vec<Found> {
     if !first_is(&found, |best| {
         fits(best) || suffices(best) && best.share >= ALL_BUT
     }) {
-        let pairs = search.pairs(&found);
+        let leaves_next_to_nothing = first_is(&found, |best| best.share >= ENOUGH);
+        let pairs = if leaves_next_to_nothing {
+            search.pairs_with(&found[0])
+        } else {
+            search.pairs(&found)
+        };
         found = preferred(found, pairs);
     }
     if !first_is(&found, |best| suffices(best) || best.share > MOST) {

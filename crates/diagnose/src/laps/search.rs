@@ -38,6 +38,9 @@ pub(super) struct Search<'a> {
 
 /// Rounds of a descent, each with the log-likelihood, and the share of the best one's, by which what lies behind then does
 /// not come back.
+type Rounds = [(Round, f64, f64)];
+
+/// Those of single effects.
 const ROUNDS: [(Round, f64, f64); 5] = [
     (Round::Rough, 50.0, 0.2),
     (Round::Again, 30.0, 0.03),
@@ -54,6 +57,16 @@ const ROUNDS_OF_SEVERAL: [(Round, f64, f64); 6] = [
     (Round::Full, 15.0, 0.004),
     (Round::Full, 15.0, 0.004),
     (Round::Full, 15.0, 0.004),
+];
+
+/// The same beside an effect that explains nearly all, from where there is not far to go.
+const ROUNDS_BESIDE: [(Round, f64, f64); 6] = [
+    (Round::Rough, 50.0, 0.001),
+    (Round::Again, 30.0, 0.0005),
+    (Round::Again, 25.0, 0.0002),
+    (Round::Full, 15.0, 0.0001),
+    (Round::Full, 15.0, 0.0001),
+    (Round::Full, 15.0, 0.0001),
 ];
 
 /// The same for hypotheses of many numbers that are linear in what they do.
@@ -175,7 +188,7 @@ impl Search<'_> {
         let starts: Vec<Hypothesis> = (hunts.iter().take(CLOSER))
             .filter_map(|(_, hunt)| self.atlas.hunted(self.simulate, self.data, hunt))
             .collect();
-        self.settle(self.descend_several(&starts, f64::NEG_INFINITY))
+        self.settle(self.descend_several(&starts, &ROUNDS_OF_SEVERAL, f64::NEG_INFINITY))
     }
 
     fn jumping(&self) -> impl Iterator<Item = usize> {
@@ -209,11 +222,32 @@ impl Search<'_> {
             let further = self.beside(&single.hypothesis, &single.left, &starts);
             starts.extend(further);
         }
-        let mut descents = self.descend_several(&starts, f64::NEG_INFINITY);
+        self.pairs_from(&starts, &ROUNDS_OF_SEVERAL, f64::NEG_INFINITY)
+    }
+
+    /// The best pairs of a single effect that explains nearly all, tried to the end: those with what explains best what it
+    /// leaves, if anything gains there what a further effect must.
+    pub(super) fn pairs_with(&self, single: &Found) -> Vec<Found> {
+        /// Score of the least that could turn out to be worth its numbers.
+        const PROMISING: f64 = 5.0;
+        let screened = self.atlas.screen(&single.left);
+        let promises = |other: &&Screened| {
+            !self.shares_effect(other, &single.hypothesis) && !self.jumps(&other.hypothesis)
+        };
+        let best = screened.iter().find(promises);
+        if best.is_none_or(|best| best.score < PROMISING) {
+            return Vec::new();
+        }
+        let starts = self.beside(&single.hypothesis, &single.left, &[]);
+        self.pairs_from(&starts, &ROUNDS_BESIDE, single.explanation.score)
+    }
+
+    fn pairs_from(&self, starts: &[Hypothesis], rounds: &Rounds, reached: f64) -> Vec<Found> {
+        let mut descents = self.descend_several(starts, rounds, reached);
         // What leaves far too much lacks a third effect rather than another second one.
         if let Some(best) = best_of(&descents).filter(|best| !best.leaves_far_too_much()) {
-            let exchanged = self.exchanged(best, &starts);
-            descents.extend(self.descend_several(&exchanged, best.score));
+            let exchanged = self.exchanged(best, starts);
+            descents.extend(self.descend_several(&exchanged, rounds, best.score));
         }
         self.settle(descents)
     }
@@ -239,13 +273,13 @@ impl Search<'_> {
     /// The best explanation with what explains its remainder best beside it, tried to the end.
     pub(super) fn further(&self, best: &Found) -> Vec<Found> {
         let starts = self.beside(&best.hypothesis, &best.left, &[]);
-        self.settle(self.descend_several(&starts, f64::NEG_INFINITY))
+        self.settle(self.descend_several(&starts, &ROUNDS_OF_SEVERAL, f64::NEG_INFINITY))
     }
 
     /// Descends from hypotheses of several effects; the best one is tried without its patterns too, and with its pattern given
     /// to another of its effects: what another effect left may have suggested it.
-    fn descend_several(&self, starts: &[Hypothesis], reached: f64) -> Vec<Descent> {
-        let mut descents = self.descend(starts.iter(), &ROUNDS_OF_SEVERAL, reached);
+    fn descend_several(&self, starts: &[Hypothesis], rounds: &Rounds, reached: f64) -> Vec<Descent> {
+        let mut descents = self.descend(starts.iter(), rounds, reached);
         let best = best_of(&descents);
         let others: Vec<Hypothesis> = best.map_or_else(Vec::new, |best| {
             let plain = best.hypothesis.without_patterns(self.atlas).into_iter();
@@ -253,7 +287,7 @@ impl Search<'_> {
                 .chain(best.hypothesis.with_pattern_elsewhere(self.atlas))
                 .collect()
         });
-        descents.extend(self.descend(others.iter(), &ROUNDS_OF_SEVERAL, reached));
+        descents.extend(self.descend(others.iter(), rounds, reached));
         descents
     }
 
@@ -261,11 +295,15 @@ impl Search<'_> {
     /// that jump: [`Search::scans_beside`] is for these.
     fn beside(&self, start: &Hypothesis, left: &White, tried: &[Hypothesis]) -> Vec<Hypothesis> {
         const FURTHER: usize = 3;
+        let gain = 0.5 * (self.residual.norm_squared() - left.norm_squared());
         let screened = self.atlas.screen(left);
         let others = self.shortlist(&screened).into_iter();
         others
             .filter(|screened| !self.shares_effect(screened, start) && !self.jumps(&screened.hypothesis))
-            .map(|other| start.with(&other.hypothesis))
+            .map(|other| (other.score, start.with(&other.hypothesis)))
+            // A pattern may cost more than all that a further effect gains.
+            .filter(|(score, pair)| pair.worth(gain + score) > start.worth(gain))
+            .map(|(_, pair)| pair)
             .filter(|pair| !tried.iter().any(|other| other.probes() == pair.probes()))
             .take(FURTHER)
             .collect()
@@ -358,7 +396,7 @@ impl Search<'_> {
     fn try_rounds<'h>(
         &self,
         hypotheses: impl Iterator<Item = &'h Hypothesis>,
-        rounds: &[(Round, f64, f64)],
+        rounds: &Rounds,
     ) -> Vec<Found> {
         self.settle(self.descend(hypotheses, rounds, f64::NEG_INFINITY))
     }
@@ -368,7 +406,7 @@ impl Search<'_> {
     fn descend<'h>(
         &self,
         hypotheses: impl Iterator<Item = &'h Hypothesis>,
-        rounds: &[(Round, f64, f64)],
+        rounds: &Rounds,
         reached: f64,
     ) -> Vec<Descent> {
         /// Descents that go on where none seems to come to an end, or the others seem to lose.
