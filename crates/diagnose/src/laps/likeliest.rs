@@ -63,10 +63,11 @@ impl Atlas {
         let fit = |moved: f64, evaluated: &Evaluated| {
             let there = hypothesis.moved(self, &[(*freedom, moved)]);
             let more = self.evaluate_more(simulate, &there, evaluated.clone(), sets)?;
-            self.fit(data, &more)
+            Some((self.fit(data, &more)?, more))
         };
-        let center = fit(0.0, &local.center)?;
-        let gained = |moved: f64, evaluated: &Evaluated| Some(fit(moved, evaluated)?.gain - center.gain);
+        let (_, center) = fit(0.0, &local.center)?;
+        let center = self.fit_with_error(data, &center)?;
+        let gained = |moved: f64, evaluated: &Evaluated| Some(fit(moved, evaluated)?.0.gain - center.gain);
         let top = top((down, gained(down, at_down)?), (up, gained(up, at_up)?))?;
         Some(Likeliest {
             moved: freedom.possible(top.place),

@@ -87,7 +87,9 @@ pub(super) struct Descent {
     errors: Vec<f64>,
     /// Log-likelihood gained over the declared model less the price of the fitted numbers, as the last round saw it.
     pub(super) score: f64,
-    /// By how much the last round raised that.
+    /// Standard deviation of that for the simulation's own error.
+    pub(super) score_error: f64,
+    /// By how much the last round raised the score.
     pub(super) progress: f64,
     /// What it leaves, as the last round but a rough one saw it.
     pub(super) remainder: Option<FourNumbers>,
@@ -113,6 +115,7 @@ impl Descent {
             hypothesis: hypothesis.clone(),
             errors: vec![f64::INFINITY; freedoms.len()],
             score: f64::NEG_INFINITY,
+            score_error: 0.0,
             progress: f64::INFINITY,
             remainder: None,
             near: None,
@@ -198,12 +201,13 @@ impl Atlas {
         round: Round,
     ) -> Option<Descent> {
         let center = self.evaluate(simulate, &descent.hypothesis, self.enough(round.sets(), 1))?;
-        let fit = self.fit(data, &center)?;
+        let fit = self.fit_with_error(data, &center)?;
         let gain = fit.gain + fit.lost_to_doubt;
         let score = self.score_of(&descent.hypothesis, gain);
         let found = round == Round::Full;
         Some(Descent {
             score,
+            score_error: fit.gain_error,
             progress: score - descent.score,
             remainder: Some(FourNumbers::new(&fit.residual, &self.layout)),
             found,
@@ -239,14 +243,15 @@ impl Atlas {
             ..
         } = descent;
         let center = &local.center;
-        let gain = if round == Round::Rough {
+        let (gain, score_error) = if round == Round::Rough {
             let Fit {
                 gain,
                 lost_to_doubt,
+                gain_error,
                 residual,
-                ..
             } = &nearest.fit;
-            gain + lost_to_doubt - 0.5 * (self.least_left(&hypothesis) - residual.norm_squared()).max(0.0)
+            let too_little = (self.least_left(&hypothesis) - residual.norm_squared()).max(0.0);
+            (gain + lost_to_doubt - 0.5 * too_little, *gain_error)
         } else {
             let sets = self.enough(round.sets(), 1);
             let center = self.evaluate_more(simulate, &hypothesis, center.clone(), sets)?;
@@ -266,6 +271,7 @@ impl Atlas {
         let score = self.score_of(&hypothesis, gain);
         Some(Descent {
             score,
+            score_error,
             progress: score - descent.score,
             near: Some((local, moves)),
             looks: looks + 1,
@@ -289,6 +295,7 @@ impl Atlas {
         let score = self.score_of(&hypothesis, to.gain + to.hoped);
         Descent {
             score,
+            score_error: to.fit.gain_error,
             progress: score - descent.score,
             remainder: full.then(|| FourNumbers::new(&to.fit.residual, &self.layout)),
             near: None,
@@ -324,7 +331,7 @@ impl Atlas {
             .map(|(column, moved)| column.from(*moved))
             .collect();
         let nearest = self.nearest(data, &center, &local.scatter, &columns, &freedoms);
-        let gain = self.likely_gain(data, &descent.hypothesis, &center, nearest.hoped)?;
+        let (gain, score_error) = self.likely_gain(data, &descent.hypothesis, &center, nearest.hoped)?;
         let Nearest { moves, errors, .. } = nearest;
         let found = full && is_settled(&moves, &nearest.covariance, &freedoms);
         let remainder = Some(FourNumbers::new(&nearest.fit.residual, &self.layout));
@@ -339,6 +346,7 @@ impl Atlas {
         let score = self.score_of(&hypothesis, gain);
         Some(Descent {
             score,
+            score_error,
             progress: score - descent.score,
             remainder,
             holds: holds && are_within_steps(&moved, &freedoms),
@@ -355,17 +363,18 @@ impl Atlas {
 
     /// The log-likelihood gained by a simulated hypothesis once its numbers have moved, which is hoped to gain so much more: never
     /// so much that less would be left than chance leaves. What the simulation's own error is expected to cost is added back:
-    /// rounds simulate more or less often.
+    /// rounds simulate more or less often. Also its standard deviation for that error.
     fn likely_gain(
         &self,
         data: &Expectation,
         hypothesis: &Hypothesis,
         simulated: &Evaluated,
         hoped: f64,
-    ) -> Option<f64> {
-        let fit = self.fit(data, simulated)?;
+    ) -> Option<(f64, f64)> {
+        let fit = self.fit_with_error(data, simulated)?;
         let most = 0.5 * (fit.residual.norm_squared() - self.least_left(hypothesis));
-        Some(fit.gain + fit.lost_to_doubt + hoped.min(most.max(0.0)))
+        let gain = fit.gain + fit.lost_to_doubt + hoped.min(most.max(0.0));
+        Some((gain, fit.gain_error))
     }
 
     /// The least sum of squares that a hypothesis may be hoped to leave of data: what chance leaves in the luckiest case, and in
@@ -412,7 +421,7 @@ impl Atlas {
             Some(end) if hypothesis == found.hypothesis => end.clone(),
             _ => self.evaluate(simulate, &hypothesis, self.enough(END_SETS, 1))?,
         };
-        let fit = self.fit(data, &end)?;
+        let fit = self.fit_with_error(data, &end)?;
         Some(self.settled(hypothesis, found.errors(), fit, end))
     }
 

@@ -409,6 +409,8 @@ impl Search<'_> {
         rounds: &Rounds,
         reached: f64,
     ) -> Vec<Descent> {
+        /// Errors of a difference in log-likelihood that may be chance.
+        const ERRORS: f64 = 2.0;
         /// Descents that go on where none seems to come to an end, or the others seem to lose.
         const FEW: usize = 3;
         let mut alive: Vec<Descent> = hypotheses
@@ -422,9 +424,11 @@ impl Search<'_> {
             let Some(first) = alive.first() else {
                 break;
             };
-            let (best, hopeless, fits) = (first.score, is_hopeless(first), first.fits());
+            let (best, error) = (first.score, first.score_error);
+            let (hopeless, fits) = (is_hopeless(first), first.fits());
             let bar = best.max(reached);
-            alive.retain(|d| d.within_reach() >= bar - behind.max(share * bar));
+            let may_be_chance = |d: &Descent| ERRORS * error.hypot(d.score_error);
+            alive.retain(|d| d.within_reach() >= bar - behind.max(share * bar).max(may_be_chance(d)));
             alive = self.without_repeats(alive);
             if fits {
                 let others = alive.split_off(FEW.min(alive.len()));
@@ -498,8 +502,10 @@ impl Search<'_> {
         if first.is_some_and(|first| leaves(first) < HOPELESS_P) {
             return settled;
         }
-        let (close, mut others): (Vec<_>, Vec<_>) =
-            (settled.into_iter()).partition(|s| s.refined.score > best - CLOSE);
+        let error = |s: &Settled| s.refined.fit.gain_error;
+        let best_error = first.map_or(0.0, error);
+        let (close, mut others): (Vec<_>, Vec<_>) = (settled.into_iter())
+            .partition(|s| s.refined.score > best - CLOSE.max(2.0 * best_error.hypot(error(s))));
         let smaller = (USUAL_LAPS / self.atlas.layout.total_laps() as u64).max(1);
         let sets = match close.len() as u64 {
             0 | 1 => FINAL_SETS,

@@ -141,7 +141,12 @@ impl Atlas {
 
     /// What simulated data sets say of their hypothesis. What their draws did to the declared model is taken off as far as
     /// it helps (a control variate).
-    fn evaluated(&self, summaries: Vec<Summary>, declared: &[&Expectation], alike: bool) -> Evaluated {
+    pub(super) fn evaluated(
+        &self,
+        summaries: Vec<Summary>,
+        declared: &[&Expectation],
+        alike: bool,
+    ) -> Evaluated {
         let sets = summaries.len();
         let mean = Expectation::of(summaries.iter(), alike);
         let declared_mean = Expectation::mean(declared, alike);
