@@ -209,6 +209,17 @@ fn an_offset_that_cuts_most_readings_is_one_effect_in_logs() {
 }
 
 #[test]
+fn a_wall_that_is_elsewhere_is_one_effect_in_logs() {
+    const DISTANCE_M: f64 = 0.0039;
+    let scratch = Scratch::new();
+    let wall = Setting::constant(sim::find("inner-wall-offset").unwrap(), [DISTANCE_M]);
+    Robot::with(wall).logged(&[3; 3]).record(&scratch, "set");
+    let found = trace(&scratch, "braitenberg", "set", &[]);
+    says(&found, "explained", &["inner-wall-offset"]);
+    holds(&found["effects"][0], "distance_m", DISTANCE_M, 0.0);
+}
+
+#[test]
 fn a_carpet_with_a_grain_has_no_name_in_laps() {
     share_signatures("braitenberg");
     let scratch = Scratch::new();

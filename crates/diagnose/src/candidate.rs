@@ -1,6 +1,6 @@
 //! What might explain a residual.
 
-use sim::{Pattern, Setting, Stage, UNLISTED};
+use sim::{Param, Pattern, Setting, Stage, UNLISTED};
 
 use crate::Cause;
 
@@ -53,4 +53,33 @@ pub(crate) fn label(setting: &Setting) -> String {
         format!(" ({})", fixed.join(", "))
     };
     format!("{}{fixed}{pattern}", spec.name)
+}
+
+/// A value brought into its parameter's range: angles and places on a closed wall go round, others stop at the end.
+pub(crate) fn within(value: f64, param: &Param) -> f64 {
+    if param.name == "position" {
+        return value.rem_euclid(1.0);
+    }
+    if param.name == "azimuth_rad" {
+        let pi = std::f64::consts::PI;
+        return (value + pi).rem_euclid(2.0 * pi) - pi;
+    }
+    value.clamp(param.low, param.high)
+}
+
+#[cfg(test)]
+mod tests {
+    use sim::find;
+
+    use super::*;
+
+    #[test]
+    fn places_go_round_a_wall_and_sizes_stop_at_the_end_of_their_range() {
+        let bump = find("wall-bump").unwrap();
+        let param = |name: &str| bump.params.iter().find(|param| param.name == name).unwrap();
+        assert!((within(-0.005, param("position")) - 0.995).abs() < 1e-12);
+        assert!((within(1.005, param("position")) - 0.005).abs() < 1e-12);
+        let height = param("height_m");
+        assert_eq!(within(height.high + 1.0, height), height.high);
+    }
 }

@@ -6,6 +6,7 @@ use super::atlas::Atlas;
 use super::probe::Probe;
 use super::screen::{at, worth};
 use super::tests_of_fit::Quadratic;
+use crate::candidate::within;
 
 /// How an effect goes over the runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -477,18 +478,6 @@ fn differ(values: &[(f64, f64)]) -> Quadratic {
         / total;
     let square = |(value, error): &(f64, f64)| ((value - mean) / error).powi(2);
     Quadratic::new(values.iter().map(square).sum(), values.len().saturating_sub(1))
-}
-
-/// A value brought into its parameter's range: angles and places on a closed wall go round, others stop at the end.
-fn within(value: f64, param: &sim::Param) -> f64 {
-    if param.name == "position" {
-        return value.rem_euclid(1.0);
-    }
-    if param.name == "azimuth_rad" {
-        let pi = std::f64::consts::PI;
-        return (value + pi).rem_euclid(2.0 * pi) - pi;
-    }
-    value.clamp(param.low, param.high)
 }
 
 #[cfg(test)]

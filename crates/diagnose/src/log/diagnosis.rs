@@ -83,25 +83,19 @@ pub fn diagnose_logs(model: &Model, scene: &Scene, runs: &[&[LogRow]]) -> Result
         return Ok(search.answer(decide, corners(&first)));
     };
     // A large effect blurs where the corners are: they are looked for again beside the best candidate.
-    let settings = search
-        .found
-        .first()
-        .map_or(Vec::new(), |best| best.settings.clone());
-    let again = recut(&scene, &wide, &declared, &settings);
-    let better = again.as_ref().map_or(&scene, |found| &found.1);
-    if corners(&again) == corners(&first) {
+    let again = recut(&scene, &wide, &declared, search.best());
+    let declared = declared.elsewhere(again.as_ref().map_or(&scene, |found| &found.1));
+    // So are the readings that no edge spoils, where rays go elsewhere with it; and once more, beside its better size.
+    let clear = declared.clear_with(search.best());
+    if corners(&again) == corners(&first) && clear.is_none() {
         search.finish(&leads);
         return Ok(search.answer(decide, corners(&first)));
     }
-    let mut renewed = Search::new(declared.elsewhere(better), step)?;
-    renewed.p = search.p;
-    renewed.detectable = std::mem::take(&mut search.detectable);
-    renewed.found = search
-        .found
-        .iter()
-        .filter_map(|found| renewed.renew(found))
-        .collect();
-    renewed.sort();
+    let goes_elsewhere = clear.is_some();
+    let mut renewed = search.renewed(clear.unwrap_or_else(|| declared.elsewhere(declared.scene)))?;
+    if goes_elsewhere && let Some(clear) = declared.clear_with(renewed.best()) {
+        renewed = renewed.renewed(clear)?;
+    }
     renewed.finish(&leads);
     Ok(renewed.answer(decide, corners(&again)))
 }
@@ -258,6 +252,22 @@ impl<'a> Search<'a> {
             .filter(keeps)
             .map(|(lead, _)| lead)
             .collect()
+    }
+
+    /// The effects of the best candidate; none if there is none.
+    fn best(&self) -> &[Setting] {
+        self.found.first().map_or(&[], |best| &best.settings)
+    }
+
+    /// The same search with other evidence, its candidates refined again by it.
+    fn renewed<'b>(self, evidence: Evidence<'b>) -> Result<Search<'b>, Error> {
+        let mut renewed = Search::new(evidence, self.step)?;
+        (renewed.p, renewed.detectable) = (self.p, self.detectable);
+        renewed.found = (self.found.iter())
+            .filter_map(|found| renewed.renew(found))
+            .collect();
+        renewed.sort();
+        Ok(renewed)
     }
 
     /// A candidate refined again, from where it is.

@@ -5,9 +5,10 @@ use sim::{Forecast, Model, Pattern, Scene, Setting, World};
 
 use super::catalogue::stage_of;
 use super::columns::columns;
-use super::filter::{Trace, Used, clear_readings, filter, likelihood};
+use super::filter::{Trace, Used, clear_readings, filter, likelihood, reaches_elsewhere};
 use super::rows::{LogRow, stretches};
 use super::screen::{Normal, normal_of};
+use crate::candidate::within;
 
 /// A stretch of one run's log and what of it counts.
 #[derive(Debug, Clone)]
@@ -48,14 +49,14 @@ impl Knob {
         }
     }
 
-    /// The settings with the value changed by a multiple of the step, kept inside its range.
+    /// The settings with the value changed by a multiple of the step, kept in its range.
     pub(crate) fn turned(&self, settings: &[Setting], multiple: f64) -> Vec<Setting> {
         let mut turned = settings.to_vec();
         let param = settings[self.setting].spec.params.get(self.value);
         let value = self.of(&mut turned);
         *value += multiple * self.step;
         if let (false, Some(param)) = (self.slope, param) {
-            *value = value.clamp(param.low, param.high);
+            *value = within(*value, param);
         }
         turned
     }
@@ -149,6 +150,28 @@ impl<'a> Evidence<'a> {
             stretches,
             step_counts: self.step_counts,
         }
+    }
+
+    /// The evidence of the readings that count with these effects too, if rays then go elsewhere: others come near the end of
+    /// the range, and near edges.
+    pub(crate) fn clear_with(&self, settings: &[Setting]) -> Option<Self> {
+        let narrower = |stretch: &Stretch<'a>| {
+            let (world, trace) = self.trace(stretch, settings)?;
+            if !reaches_elsewhere(&world, &self.world(&[], stretch.run).ok()?, &trace) {
+                return None;
+            }
+            let clear = clear_readings(&world, &trace, stretch.rows);
+            let used = stretch.used.iter().zip(&clear).map(|(a, b)| a & b).collect();
+            Some(Stretch {
+                used,
+                ..stretch.clone()
+            })
+        };
+        let stretches: Option<_> = self.stretches.par_iter().map(narrower).collect();
+        Some(Self {
+            stretches: stretches?,
+            ..*self
+        })
     }
 
     /// The log-likelihood with these effects added.

@@ -335,24 +335,53 @@ pub(crate) fn clear_readings(world: &World<'_>, trace: &Trace, rows: &[LogRow]) 
     (trace.instants.iter().zip(rows).enumerate())
         .map(|(i, (instant, row))| {
             let mut used = available(row, i);
-            let turned = |by: f64| {
+            let mut distances_from = |by: [f64; 3]| {
                 let mut state = State::new(instant.moved_from, still);
-                state.shift([0.0, 0.0, by]);
-                state.pose
+                state.shift(by);
+                forecast.readings(state.pose, &still).look.distance_m
             };
-            let sides = [-SILHOUETTE_RAD, SILHOUETTE_RAD]
-                .map(|by| forecast.readings(turned(by), &still).look.distance_m);
+            let turned = [-SILHOUETTE_RAD, SILHOUETTE_RAD].map(|by| distances_from([0.0, 0.0, by]));
+            let about = ABOUT.map(&mut distances_from);
             for lane in 0..8 {
                 let at = instant.look.distance_m[lane];
                 let edge = (at - range_m).abs() < EDGE_M + 2.0 * instant.look.deviation_m[lane];
-                let leap = sides.iter().any(|side| leaps(at, side[lane], range_m));
-                if edge || leap {
+                // A ray that hits nothing has no such deviation.
+                let missed = at >= range_m && about.iter().any(|side| side[lane] < range_m);
+                let leap = turned.iter().any(|side| leaps(at, side[lane], range_m));
+                if edge || missed || leap {
                     used &= !(1 << (lane + 2));
                 }
             }
             used
         })
         .collect()
+}
+
+/// How far the pose may be off, as x, y and heading.
+const ABOUT: [[f64; 3]; 6] = [
+    [-OFF_M, 0.0, 0.0],
+    [OFF_M, 0.0, 0.0],
+    [0.0, -OFF_M, 0.0],
+    [0.0, OFF_M, 0.0],
+    [0.0, 0.0, -OFF_RAD],
+    [0.0, 0.0, OFF_RAD],
+];
+const OFF_M: f64 = 0.002;
+const OFF_RAD: f64 = 0.03;
+
+/// Whether rays of one world end elsewhere than those of another from the poses of a trace, as a few of them tell.
+pub(crate) fn reaches_elsewhere(world: &World<'_>, other: &World<'_>, trace: &Trace) -> bool {
+    const EVERY: usize = 50;
+    const ALIKE_M: f64 = 1e-5;
+    let (Ok(mut own), Ok(mut other)) = (Forecast::new(world), Forecast::new(other)) else {
+        return false;
+    };
+    let still = [[0.0; 3]; 3];
+    trace.instants.iter().step_by(EVERY).any(|instant| {
+        let [own, other] = [&mut own, &mut other]
+            .map(|forecast| forecast.readings(instant.moved_from, &still).look.distance_m);
+        own.iter().zip(&other).any(|(a, b)| (a - b).abs() > ALIKE_M)
+    })
 }
 
 const SILHOUETTE_RAD: f64 = 0.06;
