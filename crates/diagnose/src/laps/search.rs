@@ -72,6 +72,9 @@ const ROUNDS_BESIDE: [(Round, f64, f64); 6] = [
 /// The same for hypotheses of many numbers that are linear in what they do.
 const ROUNDS_OF_GROUPS: [(Round, f64, f64); 2] = [(Round::Rough, 30.0, 0.05), (Round::Full, 20.0, 0.015)];
 
+/// Errors of a difference in log-likelihood that may be chance.
+const ERRORS: f64 = 2.0;
+
 impl Search<'_> {
     /// The best single effects, tried to the end, best first.
     pub(super) fn singles(&self, screened: &[Screened]) -> Vec<Found> {
@@ -409,8 +412,6 @@ impl Search<'_> {
         rounds: &Rounds,
         reached: f64,
     ) -> Vec<Descent> {
-        /// Errors of a difference in log-likelihood that may be chance.
-        const ERRORS: f64 = 2.0;
         /// Descents that go on where none seems to come to an end, or the others seem to lose.
         const FEW: usize = 3;
         let mut alive: Vec<Descent> = hypotheses
@@ -504,8 +505,9 @@ impl Search<'_> {
         }
         let error = |s: &Settled| s.refined.fit.gain_error;
         let best_error = first.map_or(0.0, error);
-        let (close, mut others): (Vec<_>, Vec<_>) = (settled.into_iter())
-            .partition(|s| s.refined.score > best - CLOSE.max(2.0 * best_error.hypot(error(s))));
+        let behind = |s: &Settled| CLOSE.max(ERRORS * best_error.hypot(error(s)));
+        let (close, mut others): (Vec<_>, Vec<_>) =
+            (settled.into_iter()).partition(|s| s.refined.score > best - behind(s));
         let smaller = (USUAL_LAPS / self.atlas.layout.total_laps() as u64).max(1);
         let sets = match close.len() as u64 {
             0 | 1 => FINAL_SETS,

@@ -84,9 +84,9 @@ impl Atlas {
                 square += of_run.1;
                 variance += of_run.2;
             }
+            // The variance divides by the number of sets; the mean of as many has an error too.
             let sets = simulated.len() as f64;
-            // The mean of the simulated sets has an error too, and nalgebra's variance divides by their number.
-            let variance = variance * sets / (sets - 1.0) * (1.0 + 1.0 / sets);
+            variance *= sets / (sets - 1.0) * (1.0 + 1.0 / sets);
             Settling {
                 time_s,
                 more: more / square,

@@ -24,6 +24,8 @@ pub enum Decided {
 /// Largest errors of a written number: speeds have 5 decimals, readings 1.
 const SPEED_ROUNDING_M_S: f64 = 6e-6;
 const SUM_ROUNDING_COUNTS: f64 = 0.16;
+/// Standard deviation of that of a sum of three readings.
+const SUM_DEVIATION_COUNTS: f64 = 0.05;
 /// Share of the control steps that may miss by more, where a command was cut or a file was mended.
 const FORGIVEN: f64 = 2e-3;
 /// Relative change of a constant below which it is the declared one.
@@ -241,7 +243,9 @@ fn rules(run: &[Choice], declared_counts: f64, sloped: bool) -> Constants {
     Constants {
         speed_m_s: speed,
         parameter: [threshold, slope],
-        parameter_error: ((high - low).abs() / 12.0_f64.sqrt()).min(0.1 * declared_counts),
+        parameter_error: ((high - low) / 12.0_f64.sqrt())
+            .hypot(SUM_DEVIATION_COUNTS)
+            .min(0.1 * declared_counts),
         missed: run.iter().filter(missed).count() as f64 / run.len() as f64,
     }
 }
@@ -311,4 +315,36 @@ fn candidate(
         gain: f64::INFINITY,
         fitted,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A step of a rule-based controller with threshold T on sums that are written to 0.1 counts.
+    fn chosen(time_s: f64, right_counts: f64, threshold_counts: f64) -> Choice {
+        const SPEED_M_S: f64 = 0.05;
+        let turns = right_counts > threshold_counts;
+        Choice {
+            time_s,
+            right_counts: (right_counts * 10.0).round() / 10.0,
+            left_counts: 0.0,
+            left_m_s: if turns { -SPEED_M_S } else { SPEED_M_S },
+            right_m_s: SPEED_M_S,
+        }
+    }
+
+    #[test]
+    fn a_threshold_is_no_better_known_than_the_readings_are_written() {
+        const THRESHOLD: f64 = 410.02;
+        let sums = [409.97, 410.03, 400.0, 420.0];
+        let run: Vec<Choice> = (sums.iter().enumerate())
+            .map(|(i, sum)| chosen(0.064 * i as f64, *sum, THRESHOLD))
+            .collect();
+        let found = rules(&run, 300.0, false);
+        // Both sums next to the threshold are written as 410.0.
+        assert!((found.parameter[0] - 410.0).abs() < 1e-9, "{found:?}");
+        assert!(found.parameter_error >= SUM_DEVIATION_COUNTS, "{found:?}");
+        assert_eq!(found.missed, 0.0);
+    }
 }

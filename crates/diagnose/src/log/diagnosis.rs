@@ -91,11 +91,16 @@ pub fn diagnose_logs(model: &Model, scene: &Scene, runs: &[&[LogRow]]) -> Result
         search.finish(&leads);
         return Ok(search.answer(decide, corners(&first)));
     }
-    let goes_elsewhere = clear.is_some();
-    let mut renewed = search.renewed(clear.unwrap_or_else(|| declared.elsewhere(declared.scene)))?;
-    if goes_elsewhere && let Some(clear) = declared.clear_with(renewed.best()) {
-        renewed = renewed.renewed(clear)?;
-    }
+    let mut renewed = match clear {
+        None => search.renewed(declared)?,
+        Some(clear) => {
+            let once = search.renewed(clear)?;
+            match declared.clear_with(once.best()) {
+                None => once,
+                Some(clear) => once.renewed(clear)?,
+            }
+        }
+    };
     renewed.finish(&leads);
     Ok(renewed.answer(decide, corners(&again)))
 }
