@@ -216,8 +216,10 @@ fn setting(index: usize, effect: &config::Effect) -> Result<Setting, sim::Error>
     let slope_key = |param: &sim::Param| format!("{}_per_s", param.name);
     for key in effect.parameters.keys() {
         let known = |p: &sim::Param| p.name == key || by_time && slope_key(p) == *key;
-        if !spec.params.iter().any(known) {
-            let names: Vec<&str> = spec.params.iter().map(|p| p.name).collect();
+        // A list has no pattern.
+        let list = spec.list.iter().filter(|_| effect.by.is_none());
+        if !spec.params.iter().chain(list).any(known) {
+            let names: Vec<&str> = spec.params.iter().chain(&spec.list).map(|p| p.name).collect();
             return Err(invalid(
                 key,
                 format!("is no parameter of {}, which has {}", spec.name, names.join(", ")),
@@ -234,12 +236,22 @@ fn setting(index: usize, effect: &config::Effect) -> Result<Setting, sim::Error>
         (None, None) => Err(invalid("kind", format!("{} needs `{}`", spec.name, param.name))),
     };
     let pattern = match effect.by {
-        None => Pattern::Constant(
-            spec.params
-                .iter()
-                .map(|p| value(p, &get(p)?))
-                .collect::<Result<_, _>>()?,
-        ),
+        None => {
+            let own = spec.params.iter().map(|p| value(p, &get(p)?));
+            let mut values = own.collect::<Result<Vec<f64>, _>>()?;
+            if let Some(param) = &spec.list
+                && let Some(given) = effect.parameters.get(param.name)
+            {
+                let Value::Array(numbers) = given else {
+                    let reason = format!("{given} given, an array of numbers expected");
+                    return Err(invalid(param.name, reason));
+                };
+                for number in numbers {
+                    values.push(value(param, number)?);
+                }
+            }
+            Pattern::Constant(values)
+        }
         Some(config::Pattern::Time) => Pattern::ByTime {
             start: spec
                 .params
@@ -328,6 +340,11 @@ pub(crate) fn effect_table(setting: &Setting) -> config::Effect {
                     .zip(values)
                     .map(|(p, v)| (p.name.to_owned(), value(p, *v))),
             );
+            if let Some(list) = &setting.spec.list {
+                let numbers = values.iter().skip(params.len());
+                let numbers = numbers.map(|number| Value::Float(*number)).collect();
+                parameters.insert(list.name.to_owned(), Value::Array(numbers));
+            }
             None
         }
         Pattern::ByTime { start, per_s } => {
@@ -355,5 +372,61 @@ pub(crate) fn effect_table(setting: &Setting) -> config::Effect {
         kind: setting.spec.name.to_owned(),
         by,
         parameters,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use sim::UNLISTED;
+
+    use super::*;
+
+    fn read_back(setting_given: &Setting) -> Setting {
+        let text = toml::to_string(&effect_table(setting_given)).unwrap();
+        setting(0, &toml::from_str(&text).unwrap()).unwrap()
+    }
+
+    #[test]
+    fn settings_are_read_back_as_they_were_written() {
+        let find = |name| sim::find(name).unwrap();
+        let of = |name, pattern| Setting {
+            spec: find(name),
+            pattern,
+        };
+        let settings = [
+            of("wall-bump", Pattern::Constant(vec![1.0, 0.3, 0.004, 0.1])),
+            of("reading-gain", Pattern::ByRun(vec![vec![0.9], vec![1.1]])),
+            of(
+                "reading-gain",
+                Pattern::ByTime {
+                    start: vec![0.9],
+                    per_s: vec![1e-4],
+                },
+            ),
+            // Acts on, depends on, basis, and as many coefficients as there are.
+            Setting::constant(&UNLISTED, [5.0, 6.0, 2.0, 0.1, -0.2, 150.0]),
+            Setting::constant(&UNLISTED, [0.0, 1.0, 1.0]),
+        ];
+        for setting in settings {
+            assert_eq!(read_back(&setting), setting);
+        }
+    }
+
+    #[test]
+    fn coefficients_are_numbers_without_a_pattern() {
+        let read = |text: &str| setting(0, &toml::from_str(text).unwrap());
+        let words =
+            "kind = \"unlisted\"\nacts_on = \"reading\"\ndepends_on = \"time\"\nbasis = \"polynomial\"\n";
+        let given = |more: &str| read(&format!("{words}{more}"));
+        assert_eq!(given("").unwrap(), Setting::constant(&UNLISTED, [5.0, 6.0, 0.0]));
+        for broken in [
+            "coefficients = 0.1",
+            "coefficients = [\"a\"]",
+            "by = \"time\"\ncoefficients = [0.1]",
+        ] {
+            let error = given(broken).unwrap_err().to_string();
+            assert!(error.contains("effect.0.coefficients"), "{error}");
+        }
+        assert!(read("kind = \"reading-gain\"\ncoefficients = [1]").is_err());
     }
 }
