@@ -154,6 +154,8 @@ fn sensors_that_warm_up_have_no_name_and_settle() {
             "{at_s} s: {said}, {found:#}"
         );
     }
+    let model = std::fs::read_to_string(scratch.path("out/model.after.toml")).unwrap();
+    assert!(model.contains(&format!("{end}")), "{model}");
 }
 
 #[test]
