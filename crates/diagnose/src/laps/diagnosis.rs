@@ -35,6 +35,9 @@ const WORTH_BESIDE: f64 = 30.0;
 /// exact.
 const FAULTS: f64 = 0.001;
 
+/// Explanations of several effects beside which a further one is sought: the best need not be part of the best with one more.
+const FURTHER_FROM: usize = 2;
+
 /// Whether what an explanation leaves is as likely as that by chance.
 fn leaves_more_likely_than(explanation: &Explanation, p: f64) -> bool {
     explanation
@@ -176,7 +179,11 @@ fn explain(search: &Search<'_>, screened: &[Screened]) -> Vec<Found> {
     if let Some(best) = found.first().filter(|best| best.explanation.effects.len() > 1)
         && !suffices(&best.explanation)
     {
-        let further = search.further(best);
+        let as_many = best.explanation.effects.len();
+        let alike = found
+            .iter()
+            .filter(|other| other.explanation.effects.len() == as_many);
+        let further = search.further(alike.take(FURTHER_FROM));
         found = preferred(found, further);
     }
     // No cause without a name explains what several with theirs explain nearly all of.

@@ -273,9 +273,13 @@ impl Search<'_> {
         all.split_off(tried.len())
     }
 
-    /// The best explanation with what explains its remainder best beside it, tried to the end.
-    pub(super) fn further(&self, best: &Found) -> Vec<Found> {
-        let starts = self.beside(&best.hypothesis, &best.left, &[]);
+    /// Explanations with what explains best what they leave beside them, tried to the end.
+    pub(super) fn further<'f>(&self, bases: impl Iterator<Item = &'f Found>) -> Vec<Found> {
+        let mut starts: Vec<Hypothesis> = Vec::new();
+        for base in bases {
+            let further = self.beside(&base.hypothesis, &base.left, &starts);
+            starts.extend(further);
+        }
         self.settle(self.descend_several(&starts, &ROUNDS_OF_SEVERAL, f64::NEG_INFINITY))
     }
 
