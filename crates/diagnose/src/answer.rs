@@ -60,6 +60,11 @@ impl Explanation {
             .collect()
     }
 
+    /// Whether a cause without a name is among the effects.
+    pub(crate) fn has_no_name(&self) -> bool {
+        self.effects.iter().any(|effect| *effect.setting.spec == UNLISTED)
+    }
+
     /// What the effects are, for a reader.
     pub fn label(&self) -> String {
         let labels: Vec<String> = self.effects.iter().map(Candidate::label).collect();
@@ -77,11 +82,10 @@ pub(crate) fn indistinguishable<'a>(
     behind: f64,
 ) -> usize {
     explanations.clone().next().map_or(0, |best| {
-        let unnamed = |e: &Explanation| e.names().contains(&UNLISTED.name);
         let alike = |e: &&Explanation| {
             e.score > best.score - behind
                 && e.effects.len() == best.effects.len()
-                && unnamed(e) == unnamed(best)
+                && e.has_no_name() == best.has_no_name()
         };
         explanations.take_while(alike).count()
     })

@@ -1,6 +1,6 @@
 //! The answer: which effects, how sure, what else it could be.
 
-use sim::{Setting, UNLISTED};
+use sim::Setting;
 
 use super::atlas::{Atlas, Simulate};
 use super::classes::most_probable_first;
@@ -191,17 +191,12 @@ fn explain(search: &Search<'_>, screened: &[Screened]) -> Vec<Found> {
     if !first_is(&found, |best| suffices(best) || nearly_all(best)) {
         found = unless_named(found, search.unnamed());
     }
-    let claimed = |best: &Explanation| verdict_of(best) != Verdict::Unexplained && !has_no_name(best);
+    let claimed = |best: &Explanation| verdict_of(best) != Verdict::Unexplained && !best.has_no_name();
     if let Some(best) = found.first().filter(|best| claimed(&best.explanation)) {
         let settling = search.settling(best);
         found = unless_steady(found, settling);
     }
     found
-}
-
-/// Whether an explanation has a cause without a name.
-fn has_no_name(explanation: &Explanation) -> bool {
-    explanation.names().contains(&UNLISTED.name)
 }
 
 fn first_is(found: &[Found], holds: impl Fn(&Explanation) -> bool) -> bool {
@@ -220,7 +215,7 @@ fn verdict_of(best: &Explanation) -> Verdict {
             Verdict::Explained
         };
     }
-    let enough = if has_no_name(best) || best.effects.len() > 1 {
+    let enough = if best.has_no_name() || best.effects.len() > 1 {
         MOST
     } else {
         ENOUGH
@@ -256,7 +251,12 @@ fn preferred(fewer: Vec<Found>, more: Vec<Found>) -> Vec<Found> {
     let faults = if fits(b) { 0.0 } else { FAULTS * a.gain };
     let worth = if suffices(a) { WORTH_BESIDE } else { WORTH };
     let wins = b.gain - a.gain > (worth * numbers).max(faults) && better && !heaps_noise(b);
-    let (mut list, rest) = if wins { (more, fewer) } else { (fewer, more) };
+    with_first(wins, more, fewer)
+}
+
+/// Two lists as one, the first of them first if it wins.
+fn with_first(wins: bool, one: Vec<Found>, other: Vec<Found>) -> Vec<Found> {
+    let (mut list, rest) = if wins { (one, other) } else { (other, one) };
     list.extend(rest);
     list
 }
@@ -275,9 +275,7 @@ fn unless_named(named: Vec<Found>, unnamed: Vec<Found>) -> Vec<Found> {
                 b.share > a.share - AS_GOOD
             }
         });
-    let (mut list, rest) = if wins { (unnamed, named) } else { (named, unnamed) };
-    list.extend(rest);
-    list
+    with_first(wins, unnamed, named)
 }
 
 /// What was seen to settle comes before a size that is always the same if it explains about as much.
@@ -286,13 +284,7 @@ fn unless_steady(steady: Vec<Found>, settling: Vec<Found>) -> Vec<Found> {
         return steady;
     };
     let wins = best.explanation.share > first.explanation.share - AS_GOOD;
-    let (mut list, rest) = if wins {
-        (settling, steady)
-    } else {
-        (steady, settling)
-    };
-    list.extend(rest);
-    list
+    with_first(wins, settling, steady)
 }
 
 impl Atlas {

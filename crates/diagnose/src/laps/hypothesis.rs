@@ -383,6 +383,13 @@ impl Hypothesis {
         self.parts.len() == other.parts.len() && self.parts.iter().all(near)
     }
 
+    /// All its effects but one.
+    pub(super) fn without(&self, part: usize) -> Self {
+        let mut others = self.clone();
+        others.parts.remove(part);
+        others
+    }
+
     /// This hypothesis and another together.
     pub(super) fn with(&self, other: &Self) -> Self {
         Self {

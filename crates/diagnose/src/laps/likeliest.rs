@@ -60,14 +60,14 @@ impl Atlas {
         if far(at_down) || far(at_up) {
             return None;
         }
-        let fit = |moved: f64, evaluated: &Evaluated| {
+        let more = |moved: f64, evaluated: &Evaluated| {
             let there = hypothesis.moved(self, &[(*freedom, moved)]);
-            let more = self.evaluate_more(simulate, &there, evaluated.clone(), sets)?;
-            Some((self.fit(data, &more)?, more))
+            self.evaluate_more(simulate, &there, evaluated.clone(), sets)
         };
-        let (_, center) = fit(0.0, &local.center)?;
-        let center = self.fit_with_error(data, &center)?;
-        let gained = |moved: f64, evaluated: &Evaluated| Some(fit(moved, evaluated)?.0.gain - center.gain);
+        let center = self.fit_with_error(data, &more(0.0, &local.center)?)?;
+        let gained = |moved: f64, evaluated: &Evaluated| {
+            Some(self.fit(data, &more(moved, evaluated)?)?.gain - center.gain)
+        };
         let top = top((down, gained(down, at_down)?), (up, gained(up, at_up)?))?;
         Some(Likeliest {
             moved: freedom.possible(top.place),

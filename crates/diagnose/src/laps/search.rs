@@ -258,19 +258,27 @@ impl Search<'_> {
     /// A pair with either effect exchanged for those that explain best what the other one leaves, but for those pairs that
     /// were tried: actions do not quite add up, and of effects that do about the same the best few were tried.
     fn exchanged(&self, pair: &Descent, tried: &[Hypothesis]) -> Vec<Hypothesis> {
-        const SETS: u64 = 10;
         let parts = &pair.hypothesis.parts;
         let mut all = tried.to_vec();
         for kept in parts {
             let alone = Hypothesis::of(kept.clone());
-            let Some(evaluated) = self.atlas.evaluate(self.simulate, &alone, SETS) else {
+            let Some(left) = self.left_by(&alone) else {
                 continue;
             };
-            let left = self.atlas.white(self.data, &evaluated.expectation);
             let others = self.beside(&alone, &left, &all);
             all.extend(others);
         }
         all.split_off(tried.len())
+    }
+
+    /// What a hypothesis leaves of the data, in units of the declared model's scatter; `None` where the robot crashes.
+    fn left_by(&self, hypothesis: &Hypothesis) -> Option<White> {
+        const SETS: u64 = 10;
+        if hypothesis.parts.is_empty() {
+            return Some(self.residual.clone());
+        }
+        let evaluated = self.atlas.evaluate(self.simulate, hypothesis, SETS)?;
+        Some(self.atlas.white(self.data, &evaluated.expectation))
     }
 
     /// Explanations with what explains best what they leave beside them, tried to the end.
@@ -369,33 +377,28 @@ impl Search<'_> {
     /// An explanation with a cause without a name in place of an effect whose size is not steady but settles while a run goes
     /// on, tried to the end.
     pub(super) fn settling(&self, best: &Found) -> Vec<Found> {
-        const SETS: u64 = 10;
-        let parts = &best.hypothesis.parts;
         let of_part = |part: usize| {
             let settling = self
                 .atlas
                 .settling(self.simulate, self.runs, &best.hypothesis, part)?;
             Some((part, settling))
         };
-        let Some((part, settling)) = (0..parts.len())
+        let Some((part, settling)) = (0..best.hypothesis.parts.len())
             .filter_map(of_part)
             .filter(|(_, settling)| settling.p() < SIGNIFICANT_P)
             .max_by(|a, b| a.1.sigmas.abs().total_cmp(&b.1.sigmas.abs()))
         else {
             return Vec::new();
         };
-        let mut others = best.hypothesis.clone();
-        others.parts.remove(part);
-        let left = if others.parts.is_empty() {
-            Some(self.residual.clone())
-        } else {
-            let evaluated = self.atlas.evaluate(self.simulate, &others, SETS);
-            evaluated.map(|evaluated| self.atlas.white(self.data, &evaluated.expectation))
+        let others = best.hypothesis.without(part);
+        let Some(left) = self.left_by(&others) else {
+            return Vec::new();
         };
-        let starts = left.map_or_else(Vec::new, |left| {
-            self.atlas.screen_settling(self.simulate, &left, &settling)
-        });
-        let starts: Vec<Hypothesis> = starts.iter().map(|start| others.with(start)).collect();
+        let starts: Vec<Hypothesis> = (self.atlas)
+            .screen_settling(self.simulate, &left, &settling)
+            .iter()
+            .map(|start| others.with(start))
+            .collect();
         self.try_rounds(starts.iter(), &ROUNDS_OF_GROUPS)
     }
 

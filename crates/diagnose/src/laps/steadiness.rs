@@ -51,8 +51,7 @@ impl Atlas {
         part: usize,
     ) -> Option<Settling> {
         let settings = hypothesis.settings(self);
-        let mut others = settings.clone();
-        others.remove(part);
+        let others = hypothesis.without(part).settings(self);
         let with: Vec<Vec<Vec<Lap>>> = (0..SETS)
             .into_par_iter()
             .map(|set| simulate(&settings, set))
