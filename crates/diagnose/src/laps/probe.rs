@@ -75,6 +75,11 @@ impl Probe {
         self.free[0].0
     }
 
+    /// Whether it is the same effect, of a vector in the same direction.
+    pub(super) fn acts_like(&self, other: &Self) -> bool {
+        self.spec == other.spec && self.direction == other.direction
+    }
+
     /// A step of one of its free numbers over which its action is about linear, at a size.
     pub(super) fn step_at(&self, number: usize, size: f64) -> f64 {
         let step = self.free[number].1;

@@ -108,20 +108,23 @@ impl Search<'_> {
     /// paths it tells little of them, and nothing of what they do to the scatter.
     fn auditioned<'s>(&self, screened: &'s [Screened], listed: &[&'s Screened]) -> Vec<&'s Screened> {
         /// Score up to which a signal is weak.
-        const WEAK: f64 = 100.0;
-        const HEARD: usize = 16;
+        const WEAK: f64 = 400.0;
+        const HEARD: usize = 20;
+        /// Share of the best score, less 20, of which the noise of a path does not make as much.
+        const SHARE: f64 = 0.5;
         const SETS: u64 = 8;
         const TAKEN: usize = 4;
-        if screened.first().is_none_or(|best| best.score > WEAK) {
+        let Some(best) = screened.first().filter(|best| best.score < WEAK) else {
             return Vec::new();
-        }
-        let spec = |s: &Screened| self.atlas.probes[s.hypothesis.parts[0].probe].spec;
+        };
+        let probe = |s: &Screened| &self.atlas.probes[s.hypothesis.parts[0].probe];
         let mut heard: Vec<&Screened> = Vec::new();
         for candidate in screened {
-            let known = |other: &&Screened| spec(other) == spec(candidate);
+            let known = |other: &&Screened| probe(other).acts_like(probe(candidate));
             let constant = candidate.hypothesis.parts[0].shape == Shape::Constant;
             let new = !listed.iter().any(known) && !heard.iter().any(known);
-            if heard.len() < HEARD && constant && new && !self.jumps(&candidate.hypothesis) {
+            let may_win = candidate.score > SHARE * best.score - 20.0;
+            if heard.len() < HEARD && may_win && constant && new && !self.jumps(&candidate.hypothesis) {
                 heard.push(candidate);
             }
         }
