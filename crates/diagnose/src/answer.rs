@@ -38,7 +38,8 @@ pub struct Explanation {
     pub score: f64,
     /// Log-likelihood gained.
     pub gain: f64,
-    /// Share of what exceeds the declared model's expectation that it explains.
+    /// Share of what exceeds the declared model's expectation that it explains, as it is estimated: the excess that remains
+    /// scatters about nothing, and where there is little to explain the share is anything.
     pub share: f64,
     /// Probability of what remains by chance; `None` where it was not looked at.
     pub remainder_p: Option<f64>,
@@ -63,6 +64,13 @@ impl Explanation {
     /// Whether a cause without a name is among the effects.
     pub(crate) fn has_no_name(&self) -> bool {
         self.effects.iter().any(|effect| *effect.setting.spec == UNLISTED)
+    }
+
+    /// Share of what exceeds the declared model's expectation that it explains, in [0, 1]; `None` where that much of these
+    /// four numbers is often chance, of which nothing is a share.
+    pub fn explained(&self, of: &FourNumbers) -> Option<f64> {
+        let by_laps = self.remainder.is_some();
+        (!by_laps || !of.excess_is_chance()).then(|| self.share.clamp(0.0, 1.0))
     }
 
     /// What the effects are, for a reader.
@@ -245,6 +253,29 @@ mod tests {
             left_out: Vec::new(),
             cause: None,
         }
+    }
+
+    #[test]
+    fn chance_has_no_share_to_explain() {
+        use crate::Quadratic;
+        let four = |mean_q: f64| {
+            let [mean, runs] = [(mean_q, 120), (300.0, 360)].map(|(q, freedom)| Quadratic::new(q, freedom));
+            let [trend, noise] = [(134.0, 120), (9.0, 20)].map(|(q, freedom)| Quadratic::new(q, freedom));
+            FourNumbers {
+                mean,
+                runs,
+                trend,
+                noise,
+            }
+        };
+        let mut by_laps = answer(1.0, 1.0).explanations.remove(0);
+        by_laps.share = -1.25;
+        // From logs all that counts is the likelihood.
+        assert_eq!(by_laps.explained(&four(152.0)), Some(0.0));
+        by_laps.remainder = Some(four(120.0));
+        assert_eq!(by_laps.explained(&four(152.0)), None);
+        by_laps.share = 1.03;
+        assert_eq!(by_laps.explained(&four(1200.0)), Some(1.0));
     }
 
     /// The slip of standing still in one step of ten: mean 0.9, variance 0.09 + 0.9 * 0.01 / 3 of a slip of 0.1.

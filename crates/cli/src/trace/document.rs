@@ -22,7 +22,7 @@ pub(crate) fn document(trace: &Trace) -> Value {
     let mut document = json!({
         "verdict": answer.verdict.name(),
         "residual": residual(trace),
-        "effects": claimed.map_or_else(Vec::new, |a| effects(a, rivals)),
+        "effects": claimed.map_or_else(Vec::new, |a| effects(a, rivals, &trace.residual)),
         "alternative_sets": if sets.len() > 1 { sets } else { Vec::new() },
         "error": {
             "metric": "rms over the gates of the difference between the mean lateral position of simulated laps and of a held-out run, m",
@@ -30,7 +30,7 @@ pub(crate) fn document(trace: &Trace) -> Value {
             "floor": trace.mean_m(|e| &e.floor_m),
             "held_out": trace.held_out().map(|run| run.name.clone()).collect::<Vec<_>>(),
         },
-        "candidates": answer.explanations.iter().map(candidate).collect::<Vec<_>>(),
+        "candidates": answer.explanations.iter().map(|e| candidate(e, &trace.residual)).collect::<Vec<_>>(),
         "separate_with": trace.experiments.iter().map(experiment).collect::<Vec<_>>(),
         "detectable": trace.detectable.iter().map(detectable).collect::<Vec<_>>(),
         "remarks": trace.remarks,
@@ -138,7 +138,7 @@ fn residual(trace: &Trace) -> Value {
     })
 }
 
-fn effects(answer: &Explanation, rivals: &[Explanation]) -> Vec<Value> {
+fn effects(answer: &Explanation, rivals: &[Explanation], numbers: &FourNumbers) -> Vec<Value> {
     let count = answer.effects.len() as f64;
     let names = answer.names();
     let rivals: Vec<Vec<&str>> = rivals
@@ -151,7 +151,7 @@ fn effects(answer: &Explanation, rivals: &[Explanation]) -> Vec<Value> {
         alternatives.sort_unstable();
         alternatives.dedup();
         let mut entry = one_effect(effect);
-        entry["share"] = json!(answer.share / count);
+        entry["share"] = json!(answer.explained(numbers).unwrap_or(1.0) / count);
         entry["alternatives"] = json!(alternatives);
         entry
     };
@@ -252,10 +252,10 @@ pub(crate) fn parameters(effect: &Candidate) -> Vec<Value> {
     }
 }
 
-fn candidate(explanation: &Explanation) -> Value {
+fn candidate(explanation: &Explanation, numbers: &FourNumbers) -> Value {
     json!({
         "names": explanation.names(), "label": explanation.label(),
-        "score": explanation.score, "gain": explanation.gain, "share": explanation.share,
+        "score": explanation.score, "gain": explanation.gain, "share": explanation.explained(numbers),
         "parameters": explanation.effects.iter().map(parameters).collect::<Vec<_>>(),
         "remainder": explanation.remainder.as_ref().map(four), "remainder_p": explanation.remainder_p,
     })

@@ -74,11 +74,14 @@ pub(crate) fn summary(trace: &Trace) -> String {
             };
             let mut word = v.name().to_owned();
             word[..1].make_ascii_uppercase();
-            format!(
-                "{word}: {}; this explains {:.1} % of the excess.{rest}",
-                what.join(" and "),
-                100.0 * answer.share
-            )
+            let explains = match answer.explained(&trace.residual) {
+                Some(share) => format!("this explains {:.1} % of the excess", 100.0 * share),
+                None => format!(
+                    "this gains {:.1} units of log-likelihood, of an excess that as a whole chance often makes",
+                    answer.gain
+                ),
+            };
+            format!("{word}: {}; {explains}.{rest}", what.join(" and "))
         }
     };
     let rivals: Vec<String> = diagnosis.explanations[..diagnosis.indistinguishable]
@@ -315,7 +318,8 @@ fn candidates(trace: &Trace) -> Vec<Block> {
         table.push([
             format!("{}{star}", e.label()),
             format!("{:.1}", e.gain),
-            format!("{:.1} %", 100.0 * e.share),
+            e.explained(&trace.residual)
+                .map_or("-".into(), |share| format!("{:.1} %", 100.0 * share)),
             e.remainder_p.map_or("-".into(), probability),
             sizes(e),
         ]);

@@ -23,7 +23,7 @@ pub struct Quadratic {
 }
 
 impl Quadratic {
-    pub(super) fn new(q: f64, freedom: usize) -> Self {
+    pub(crate) fn new(q: f64, freedom: usize) -> Self {
         let p = match ChiSquared::new(freedom as f64) {
             Ok(chi2) => chi2.sf(q),
             // No squares, no evidence.
@@ -95,6 +95,17 @@ impl FourNumbers {
             .iter()
             .map(Quadratic::excess)
             .sum()
+    }
+
+    /// Whether chance alone often makes as much of all four together.
+    pub(crate) fn excess_is_chance(&self) -> bool {
+        const OFTEN_P: f64 = 0.05;
+        let numbers = [self.mean, self.runs, self.trend, self.noise];
+        let all = Quadratic::new(
+            numbers.iter().map(|number| number.q).sum(),
+            numbers.iter().map(|number| number.freedom).sum(),
+        );
+        all.p > OFTEN_P
     }
 
     /// Probability that the smallest of the four is as small as it is: four times that (Bonferroni).
