@@ -300,10 +300,11 @@ fn candidates(trace: &Trace) -> Vec<Block> {
         return vec![Block::Text("Nothing had to be tried.".into())];
     }
     let mut table = Table::new(
-        "Explanations fitted to the laps, best first; those marked * cannot be told apart by these laps",
+        "Explanations fitted to the laps, best first by what they gain less the price of their numbers; those marked * cannot be told apart by these laps",
         &[
             "effect",
             "log-likelihood gained",
+            "less price",
             "explained",
             "remainder p",
             "size",
@@ -318,6 +319,7 @@ fn candidates(trace: &Trace) -> Vec<Block> {
         table.push([
             format!("{}{star}", e.label()),
             format!("{:.1}", e.gain),
+            format!("{:.1}", e.score),
             e.explained(&trace.residual)
                 .map_or("-".into(), |share| format!("{:.1} %", 100.0 * share)),
             e.remainder_p.map_or("-".into(), probability),

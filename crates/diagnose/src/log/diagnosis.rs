@@ -11,14 +11,14 @@ use super::decide::{Decided, decided};
 use super::detectable::detectable;
 use super::evidence::Evidence;
 use super::filter::{MEASURED, Trace};
-use super::noise::{Factor, noises, with_honest_factor, with_memory};
+use super::noise::{Factor, by_chance, noises, p_among_repeats, with_honest_factor, with_memory};
 use super::pairs::pairs;
 use super::recut::recut;
 use super::refine::jumps;
 use super::repeat::repeats;
 use super::rows::LogRow;
 use super::screen::normals;
-use super::search::{By, Lead, Refined, leads, price, pursue, shortlist, tail, together};
+use super::search::{By, Lead, Refined, leads, price, pursue, shortlist, together};
 use super::steps::reading_step;
 use crate::answer::{ALTERNATIVE, indistinguishable};
 use crate::corners::{Corners, EXACT};
@@ -188,7 +188,11 @@ impl<'a> Search<'a> {
         let leads = self.screen(&[])?.1.clone();
         self.detectable = detectable(&leads, &self.variants, ALARM);
         let noise = noises(&self.evidence, &[], self.total());
-        self.p = by_chance(&noise).min(least_p(&leads));
+        let by_mean = least_p(&leads);
+        self.p = by_mean.min(by_chance(&noise));
+        if self.p < ALARM && by_mean >= ALARM {
+            self.p = by_mean.min(p_among_repeats(&self.evidence, &[], &noise, ALARM));
+        }
         if self.p >= ALARM {
             return None;
         }
@@ -374,6 +378,10 @@ impl<'a> Search<'a> {
                 .into_iter()
                 .filter(|n| n.gain > 10.0)
                 .max_by(|a, b| a.gain.total_cmp(&b.gain))
+                .filter(|n| {
+                    let one = std::slice::from_ref(n);
+                    p_among_repeats(&self.evidence, &best.settings, one, SIGNIFICANT_P) < SIGNIFICANT_P
+                })
                 .and_then(|n| n.refined(&self.evidence, &best.settings, self.total() + best.gain));
             more.extend(noise.map(|n| n.after(&best)));
         }
@@ -708,14 +716,6 @@ fn rough(channels: &[Channel; MEASURED]) -> Option<Unnamed> {
 /// The best score.
 fn most(leads: &[Lead]) -> f64 {
     leads.iter().map(Lead::score).fold(0.0, f64::max)
-}
-
-/// Probability that one of the noise effects gains as much by chance.
-fn by_chance(noise: &[Factor]) -> f64 {
-    noise
-        .iter()
-        .map(|n| tail(2.0 * n.gain, 1) * 6.0)
-        .fold(1.0, f64::min)
 }
 
 /// Probability of the best lead by chance, given how many there are.
