@@ -151,6 +151,7 @@ fn effects(answer: &Explanation, rivals: &[Explanation], numbers: &FourNumbers) 
         alternatives.sort_unstable();
         alternatives.dedup();
         let mut entry = one_effect(effect);
+        // Where no share of the excess can be stated, it is the share of what is explained.
         entry["share"] = json!(answer.explained(numbers).unwrap_or(1.0) / count);
         entry["alternatives"] = json!(alternatives);
         entry

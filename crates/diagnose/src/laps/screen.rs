@@ -16,6 +16,15 @@ pub(super) struct Screened {
     pub(super) score: f64,
 }
 
+impl Screened {
+    /// Whether no more than the noise and the faults of paths may have put it behind the best: it has such a share of that one's
+    /// score, but for what noise makes at any signal.
+    pub(super) fn may_win(&self, best: &Self, share: f64) -> bool {
+        const NOISE: f64 = 20.0;
+        self.score >= share * best.score - NOISE
+    }
+}
+
 /// Half the logarithm of the number of laps for each fitted number (Schwarz 1978).
 pub(super) fn price(parameters: usize, laps: usize) -> f64 {
     0.5 * parameters as f64 * (laps as f64).ln()

@@ -110,7 +110,6 @@ impl Search<'_> {
         /// Score up to which a signal is weak.
         const WEAK: f64 = 400.0;
         const HEARD: usize = 20;
-        /// Share of the best score, less 20, of which the noise of a path does not make as much.
         const SHARE: f64 = 0.5;
         const SETS: u64 = 8;
         const TAKEN: usize = 4;
@@ -123,7 +122,7 @@ impl Search<'_> {
             let known = |other: &&Screened| probe(other).acts_like(probe(candidate));
             let constant = candidate.hypothesis.parts[0].shape == Shape::Constant;
             let new = !listed.iter().any(known) && !heard.iter().any(known);
-            let may_win = candidate.score > SHARE * best.score - 20.0;
+            let may_win = candidate.may_win(best, SHARE);
             if heard.len() < HEARD && may_win && constant && new && !self.jumps(&candidate.hypothesis) {
                 heard.push(candidate);
             }
@@ -347,7 +346,7 @@ impl Search<'_> {
             } else {
                 0.7
             };
-            if candidate.score < share * best.score - 20.0 {
+            if !candidate.may_win(best, share) {
                 continue;
             }
             let of_probe = |s: &&&Screened| probe(s) == probe(candidate);

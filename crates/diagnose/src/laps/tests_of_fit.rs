@@ -89,31 +89,26 @@ impl FourNumbers {
         }
     }
 
+    fn all(&self) -> [Quadratic; 4] {
+        [self.mean, self.runs, self.trend, self.noise]
+    }
+
     /// What exceeds the expectation in all four together.
     pub fn excess(&self) -> f64 {
-        [self.mean, self.runs, self.trend, self.noise]
-            .iter()
-            .map(Quadratic::excess)
-            .sum()
+        self.all().iter().map(Quadratic::excess).sum()
     }
 
     /// Whether chance alone often makes as much of all four together.
     pub(crate) fn excess_is_chance(&self) -> bool {
         const OFTEN_P: f64 = 0.05;
-        let numbers = [self.mean, self.runs, self.trend, self.noise];
-        let all = Quadratic::new(
-            numbers.iter().map(|number| number.q).sum(),
-            numbers.iter().map(|number| number.freedom).sum(),
-        );
-        all.p > OFTEN_P
+        let q = self.all().iter().map(|number| number.q).sum();
+        let freedom = self.all().iter().map(|number| number.freedom).sum();
+        Quadratic::new(q, freedom).p > OFTEN_P
     }
 
     /// Probability that the smallest of the four is as small as it is: four times that (Bonferroni).
     pub fn omnibus_p(&self) -> f64 {
-        let least = [self.mean, self.runs, self.trend, self.noise]
-            .map(|q| q.p)
-            .into_iter()
-            .fold(1.0, f64::min);
+        let least = self.all().iter().map(|number| number.p).fold(1.0, f64::min);
         (4.0 * least).min(1.0)
     }
 }

@@ -189,10 +189,11 @@ impl<'a> Search<'a> {
         self.detectable = detectable(&leads, &self.variants, ALARM);
         let noise = noises(&self.evidence, &[], self.total());
         let by_mean = least_p(&leads);
-        self.p = by_mean.min(by_chance(&noise));
-        if self.p < ALARM && by_mean >= ALARM {
-            self.p = by_mean.min(p_among_repeats(&self.evidence, &[], &noise, ALARM));
-        }
+        self.p = by_mean.min(if by_mean < ALARM {
+            by_chance(&noise)
+        } else {
+            p_among_repeats(&self.evidence, &[], &noise, ALARM)
+        });
         if self.p >= ALARM {
             return None;
         }

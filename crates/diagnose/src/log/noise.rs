@@ -4,6 +4,7 @@ use std::ops::ControlFlow;
 
 use sim::{Pattern, Setting, Spec, find};
 use statrs::distribution::{ContinuousCDF, StudentsT};
+use statrs::statistics::Statistics;
 
 use super::evidence::Evidence;
 use super::repeat::repeats;
@@ -93,10 +94,8 @@ pub(crate) fn p_among_repeats(
 /// Probability that a further normal number is as far from the mean of some as this one is, on either side.
 fn among(number: f64, others: &[f64]) -> f64 {
     let n = others.len() as f64;
-    let mean = others.iter().sum::<f64>() / n;
-    let square = others.iter().map(|other| (other - mean).powi(2)).sum::<f64>();
-    let error = (square / (n - 1.0) * (1.0 + 1.0 / n)).sqrt();
-    StudentsT::new(0.0, 1.0, n - 1.0).map_or(1.0, |law| 2.0 * law.sf((number - mean).abs() / error))
+    let error = (others.variance() * (1.0 + 1.0 / n)).sqrt();
+    StudentsT::new(0.0, 1.0, n - 1.0).map_or(1.0, |law| 2.0 * law.sf((number - others.mean()).abs() / error))
 }
 
 /// Factors that are tried, each upwards and downwards (Bonferroni).
