@@ -160,6 +160,11 @@ impl<'w> Forecast<'w> {
         outlook
     }
 
+    /// Distances along the sensors' axes from a pose, m; infinite where there is no wall.
+    pub fn distances_m(&self, pose: Pose) -> [f64; LANES] {
+        self.apparatus.distances_m(pose)
+    }
+
     /// Expected readings where the same world without further effects had this look: rays are cast again only where
     /// the further effects turn them.
     pub fn readings_beside(&mut self, pose: Pose, covariance: &PoseMatrix, look: &Look) -> Readings {

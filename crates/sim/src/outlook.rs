@@ -107,6 +107,11 @@ impl Apparatus<'_> {
         outlook
     }
 
+    /// Distances along the sensors' axes, m; infinite where there is no wall.
+    pub(crate) fn distances_m(&self, pose: Pose) -> [f64; LANES] {
+        self.cast(pose, &self.sights[self.sights.len() / 2]).1.distance_m
+    }
+
     /// The same responses from the look that the rays along the axes had before in a world whose sensors respond alike.
     pub(crate) fn responses_where_met(&self, look: &Look) -> Readings {
         let met = self.met(&look.rays, &look.hits);

@@ -47,6 +47,18 @@ impl Variant {
         }
     }
 
+    /// The variant that a setting is one of: of the same effect, and of a cause without a name the one with the same basis.
+    pub(crate) fn of<'v>(setting: &Setting, variants: &'v [Self]) -> Option<&'v Self> {
+        let same_basis = |variant: &&Self| {
+            *setting.spec != UNLISTED
+                || matches!(&setting.pattern, Pattern::Constant(values)
+                    if values.len() == variant.values.len() && values[..3] == variant.values[..3])
+        };
+        (variants.iter())
+            .filter(|variant| *variant.spec == *setting.spec)
+            .find(same_basis)
+    }
+
     /// The settings whose columns are taken.
     pub(crate) fn settings(&self) -> Vec<Setting> {
         let with = |changes: &[(usize, f64)]| {

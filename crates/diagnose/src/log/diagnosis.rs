@@ -1,5 +1,6 @@
 //! From logs to an answer.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use rayon::prelude::*;
@@ -11,7 +12,7 @@ use super::decide::{Decided, decided};
 use super::detectable::detectable;
 use super::evidence::Evidence;
 use super::filter::{MEASURED, Trace};
-use super::noise::{Factor, by_chance, noises, p_among_repeats, with_honest_factor, with_memory};
+use super::noise::{Factor, by_chance, noises, p_among_repeats, with_memory};
 use super::pairs::pairs;
 use super::recut::recut;
 use super::refine::jumps;
@@ -132,6 +133,9 @@ struct Search<'a> {
     screened: Option<(Vec<Setting>, Screened<'a>)>,
 }
 
+/// Two effects, each with the setting where a refinement of both begins.
+type Parts = [(Variant, Setting); 2];
+
 /// Every run in its world, filtered, and the leads over them.
 type Screened<'a> = Arc<(Vec<(World<'a>, Trace)>, Vec<Lead>)>;
 
@@ -200,17 +204,13 @@ impl<'a> Search<'a> {
         let list = self.promising(shortlist(&leads, &self.variants, 8));
         self.found = self.pursued(&list);
         self.sort();
-        self.accept_noise(noise);
+        self.accept_noise(noise, &list);
         self.sort();
         Some(leads)
     }
 
     /// The leads refined: a few steps each, then to the end those that may still be the best.
     fn pursued(&self, list: &[Lead]) -> Vec<Refined> {
-        const FIRST_STEPS: usize = 2;
-        const STEPS: usize = 8;
-        /// Log-likelihood, and share of the best one's, by which what lies behind after the first steps does not come back.
-        const BEHIND: (f64, f64) = (30.0, 0.06);
         let pursue = |lead: &Lead, steps| {
             pursue(
                 &self.evidence,
@@ -223,15 +223,11 @@ impl<'a> Search<'a> {
         let first: Vec<(&Lead, Refined)> = (list.par_iter())
             .filter_map(|lead| Some((lead, pursue(lead, FIRST_STEPS)?)))
             .collect();
-        let best = first
-            .iter()
-            .map(|(_, refined)| refined.score())
-            .fold(0.0, f64::max);
+        let least = least_in_reach(first.iter().map(|(_, refined)| refined));
         first
             .into_par_iter()
             .map(|(lead, refined)| {
-                let behind = refined.score() < best - BEHIND.0.max(BEHIND.1 * best);
-                if behind || refined.settings.iter().all(jumps) {
+                if refined.score() < least || refined.settings.iter().all(jumps) {
                     return refined;
                 }
                 match lead.by {
@@ -282,15 +278,13 @@ impl<'a> Search<'a> {
 
     /// A candidate refined again, from where it is.
     fn renew(&self, found: &Refined) -> Option<Refined> {
-        let variant = self
-            .variants
-            .iter()
-            .find(|variant| *variant.spec == *found.settings[0].spec);
+        let variant = Variant::of(&found.settings[0], &self.variants);
         match (variant, found.by) {
             (Some(variant), By::Constant) if !jumps(&found.settings[0]) => together(
                 &self.evidence,
                 &[(variant.clone(), found.settings[0].clone())],
                 self.total(),
+                STEPS,
             ),
             _ => {
                 let gain = self.evidence.likelihood(&found.settings)? - self.total();
@@ -308,8 +302,7 @@ impl<'a> Search<'a> {
         self.sort();
         self.judge();
         if let (Some(best), None, None) = (self.found.first_mut(), self.step, &self.unlisted) {
-            *best = with_honest_factor(&self.evidence, best.clone())
-                .with_honest_errors(&self.evidence, &self.variants);
+            *best = best.clone().with_honest_errors(&self.evidence, &self.variants);
         }
         if let Some(twin) = self.found.first().and_then(with_memory) {
             self.found.insert(1, twin);
@@ -320,8 +313,8 @@ impl<'a> Search<'a> {
         self.found.sort_by(|a, b| b.score().total_cmp(&a.score()));
     }
 
-    /// A noise effect is a candidate only where nothing with a mean is left once it is fitted.
-    fn accept_noise(&mut self, noise: Vec<Factor>) {
+    /// A noise effect is a candidate only where nothing with a mean is left once it is fitted; `promising` would be first.
+    fn accept_noise(&mut self, noise: Vec<Factor>, promising: &[Lead]) {
         /// Log-likelihood that a column may still gain then: twice what it usually does at small noise.
         const LEFT: f64 = 14.0;
         const TIMES: f64 = 2.0;
@@ -336,11 +329,17 @@ impl<'a> Search<'a> {
         else {
             return;
         };
-        if one.score() > best.max(4.0) {
+        let promising: Vec<Variant> = (promising.iter())
+            .map(|lead| self.variants[lead.variant].clone())
+            .collect();
+        let hopes = |left: f64| left < HOPELESS * LEFT;
+        if one.score() > best.max(4.0)
+            && most_left(&self.evidence, &one.settings, &promising).is_some_and(hopes)
+        {
             let left = self
                 .screen(&one.settings)
                 .map_or(f64::INFINITY, |found| most(&found.1));
-            if left < LEFT || left < HOPELESS * LEFT && left < TIMES * self.usually_left(&one) {
+            if left < LEFT || hopes(left) && left < TIMES * self.usually_left(&one) {
                 self.found.push(one);
             }
         }
@@ -349,11 +348,7 @@ impl<'a> Search<'a> {
     /// What a column gains at most beside a noise effect in logs that have this effect alone: at large noise the filter is not
     /// linear enough to leave nothing.
     fn usually_left(&self, noise: &Refined) -> f64 {
-        let left = |repeated: &Evidence<'_>| {
-            let traces = repeated.traces(&noise.settings)?;
-            let normals = normals(&traces, &self.variants).ok()?;
-            Some(most(&leads(repeated, &self.variants, &normals)))
-        };
+        let left = |repeated: &Evidence<'_>| most_left(repeated, &noise.settings, &self.variants);
         let all = repeats(&self.evidence, &noise.settings, left);
         all.into_iter().fold(0.0, f64::max)
     }
@@ -387,8 +382,9 @@ impl<'a> Search<'a> {
             more.extend(noise.map(|n| n.after(&best)));
         }
         if best.by == By::Constant {
-            more.extend(self.beside(&best, leads));
-            more.extend(self.joint(first));
+            let mut starts = self.beside(&best, leads);
+            starts.extend(self.joint(first));
+            more.extend(self.pursued_together(&starts));
         }
         // An effect that linear algebra did not see may stand alone.
         let pair = more.iter().max_by(|a, b| a.score().total_cmp(&b.score()));
@@ -415,14 +411,12 @@ impl<'a> Search<'a> {
         (pair.settings.par_iter())
             .filter(|setting| !jumps(setting))
             .filter_map(|setting| {
-                let variant = self
-                    .variants
-                    .iter()
-                    .find(|variant| *variant.spec == *setting.spec)?;
+                let variant = Variant::of(setting, &self.variants)?;
                 together(
                     &self.evidence,
                     &[(variant.clone(), setting.clone())],
                     self.total(),
+                    STEPS,
                 )
             })
             .collect()
@@ -435,54 +429,52 @@ impl<'a> Search<'a> {
         self.remainder = (left / (left + gain).max(1e-9), least_p(leads));
     }
 
-    /// The best effect with each of the leads that are left beside it.
-    fn beside(&self, best: &Refined, leads: &[Lead]) -> Vec<Refined> {
-        let of_best = self.variants.iter().find(|v| *v.spec == *best.settings[0].spec);
-        let Some(of_best) = of_best else { return Vec::new() };
-        let constant: Vec<Lead> = leads
-            .iter()
-            .filter(|lead| lead.by == By::Constant)
-            .cloned()
-            .collect();
-        let list = shortlist(&constant, &self.variants, 3);
-        (list.par_iter())
-            .filter_map(|lead| {
+    /// The best effect with each of the leads that are left beside it, where a refinement of the two begins.
+    fn beside(&self, best: &Refined, leads: &[Lead]) -> Vec<Parts> {
+        let Some(of_best) = Variant::of(&best.settings[0], &self.variants) else {
+            return Vec::new();
+        };
+        let list = shortlist(&constant(leads), &self.variants, 3);
+        (list.iter())
+            .map(|lead| {
                 let variant = &self.variants[lead.variant];
-                let parts = [
+                [
                     (of_best.clone(), best.settings[0].clone()),
                     (variant.clone(), lead.start(variant)),
-                ];
-                together(&self.evidence, &parts, self.total())
+                ]
             })
             .collect()
     }
 
-    /// The best pairs over the columns of the declared model.
-    fn joint(&self, leads: &[Lead]) -> Vec<Refined> {
+    /// The best pairs over the columns of the declared model, where their refinements begin.
+    fn joint(&self, leads: &[Lead]) -> Vec<Parts> {
         const AMONG: usize = 36;
-        let constant: Vec<Lead> = leads
-            .iter()
-            .filter(|lead| lead.by == By::Constant)
-            .cloned()
-            .collect();
-        let list: Vec<usize> = shortlist(&constant, &self.variants, AMONG)
+        let list: Vec<usize> = shortlist(&constant(leads), &self.variants, AMONG)
             .iter()
             .map(|lead| lead.variant)
             .collect();
         let Some(traces) = self.evidence.traces(&[]) else {
             return Vec::new();
         };
-        (pairs(&traces, &self.variants, &list, 3)
-            .unwrap_or_default()
-            .par_iter())
-        .filter_map(|pair| {
-            let parts = pair
-                .parts
-                .clone()
-                .map(|(i, setting)| (self.variants[i].clone(), setting));
-            together(&self.evidence, &parts, self.total())
-        })
-        .collect()
+        let found = pairs(&traces, &self.variants, &list, 3).unwrap_or_default();
+        (found.into_iter())
+            .map(|pair| pair.parts.map(|(i, setting)| (self.variants[i].clone(), setting)))
+            .collect()
+    }
+
+    /// Pairs refined together: a few steps, then to the end the best of every two names that may still be the best of all.
+    fn pursued_together(&self, starts: &[Parts]) -> Vec<Refined> {
+        let mut first: Vec<Refined> = (starts.par_iter())
+            .filter_map(|parts| together(&self.evidence, parts, self.total(), FIRST_STEPS))
+            .collect();
+        first.sort_by(|a, b| b.score().total_cmp(&a.score()));
+        let least = least_in_reach(first.iter());
+        let mut names = BTreeSet::new();
+        let (hopeful, others): (Vec<Refined>, Vec<Refined>) =
+            (first.into_iter()).partition(|pair| names.insert(pair.names()) && pair.score() >= least);
+        let further =
+            |pair: Refined| pair.further(&self.evidence, &self.variants, self.total(), STEPS - FIRST_STEPS);
+        (hopeful.into_par_iter().map(further)).chain(others).collect()
     }
 
     /// What is left beside the best explanation, and whether that makes it dishonest to name it.
@@ -509,7 +501,7 @@ impl<'a> Search<'a> {
             .min_by(|a, b| a.fitted.cmp(&b.fitted).then(b.gain.total_cmp(&a.gain)))?;
         let variant = &groups[lead.variant];
         let setting = lead.start(variant);
-        let refined = together(&self.evidence, &[(variant.clone(), setting)], self.total())?;
+        let refined = together(&self.evidence, &[(variant.clone(), setting)], self.total(), STEPS)?;
         if refined.gain < listed {
             return None;
         }
@@ -584,9 +576,7 @@ impl<'a> Search<'a> {
             left_out: Vec::new(),
             cause,
         };
-        answer.left_out = (0..runs)
-            .map(|run| self.without(run, unnamed.or(self.found.first()), &answer))
-            .collect();
+        answer.left_out = self.without_each(runs, unnamed.or(self.found.first()), &answer);
         LogDiagnosis {
             answer,
             decide,
@@ -647,24 +637,30 @@ impl<'a> Search<'a> {
         left + (best - refined.gain).max(0.0)
     }
 
-    /// The answer's effects with sizes fitted to all runs but one.
-    fn without(&self, run: usize, best: Option<&Refined>, answer: &Answer) -> Vec<Setting> {
-        let mut settings = answer.settings();
-        let Some(best) = best else { return settings };
-        let first = settings.len().saturating_sub(best.settings.len());
-        let refitted = best.refit(&self.evidence.without(run), &self.variants);
-        for (place, setting) in settings.iter_mut().skip(first).zip(refitted) {
-            *place = setting;
-        }
-        for setting in &mut settings {
-            if let Pattern::ByRun(values) = &mut setting.pattern {
-                *setting = Setting {
-                    spec: setting.spec,
-                    pattern: Pattern::ByRun(with_mean_of_others(values, run)),
-                };
+    /// The answer's effects with sizes fitted to all runs but one, for each of so many runs.
+    fn without_each(&self, runs: usize, best: Option<&Refined>, answer: &Answer) -> Vec<Vec<Setting>> {
+        let whole = answer.settings();
+        let Some(best) = best.filter(|_| !whole.is_empty()) else {
+            return vec![whole; runs];
+        };
+        let variants = [self.variants.as_slice(), &unlisted_variants()].concat();
+        let refitted = best.refit_without_each(&self.evidence, &variants, runs);
+        let certain = whole.len().saturating_sub(best.settings.len());
+        let without = |(run, refitted): (usize, Vec<Setting>)| {
+            let mut settings = whole.clone();
+            settings.truncate(certain);
+            settings.extend(refitted);
+            for setting in &mut settings {
+                if let Pattern::ByRun(values) = &mut setting.pattern {
+                    *setting = Setting {
+                        spec: setting.spec,
+                        pattern: Pattern::ByRun(with_mean_of_others(values, run)),
+                    };
+                }
             }
-        }
-        settings
+            settings
+        };
+        refitted.into_iter().enumerate().map(without).collect()
     }
 }
 
@@ -712,6 +708,31 @@ fn rough(channels: &[Channel; MEASURED]) -> Option<Unnamed> {
         },
         refined: None,
     })
+}
+
+/// Steps of a refinement at most, and those after which what is far behind is left where it is.
+const STEPS: usize = 8;
+const FIRST_STEPS: usize = 2;
+
+/// The score from which, after the first steps, a candidate may still become the best one of these.
+fn least_in_reach<'a>(first: impl Iterator<Item = &'a Refined>) -> f64 {
+    /// Log-likelihood, and share of the best one's, by which what lies behind does not come back.
+    const BEHIND: (f64, f64) = (30.0, 0.06);
+    let best = first.map(Refined::score).fold(0.0, f64::max);
+    best - BEHIND.0.max(BEHIND.1 * best)
+}
+
+/// Those of a constant size.
+fn constant(leads: &[Lead]) -> Vec<Lead> {
+    (leads.iter().filter(|lead| lead.by == By::Constant))
+        .cloned()
+        .collect()
+}
+
+/// The best score of some variants beside settings.
+fn most_left(evidence: &Evidence<'_>, settings: &[Setting], variants: &[Variant]) -> Option<f64> {
+    let normals = normals(&evidence.traces(settings)?, variants).ok()?;
+    Some(most(&leads(evidence, variants, &normals)))
 }
 
 /// The best score.

@@ -75,6 +75,15 @@ impl Assessment {
     pub(crate) fn total(&self) -> f64 {
         self.log_likelihood.iter().sum()
     }
+
+    /// The part of it that other runs of the evidence give than this one.
+    pub(crate) fn without(&self, run: usize, evidence: &Evidence<'_>) -> Self {
+        let kept = || (evidence.stretches.iter().enumerate()).filter(|(_, stretch)| stretch.run != run);
+        Self {
+            log_likelihood: kept().map(|(i, _)| self.log_likelihood[i]).collect(),
+            normals: kept().map(|(i, _)| self.normals[i].clone()).collect(),
+        }
+    }
 }
 
 impl<'a> Evidence<'a> {

@@ -73,19 +73,25 @@ impl State {
     /// and gain.
     #[inline]
     fn update(&mut self, missed: f64, slope: [f64; 3], noise_variance: f64) -> (f64, f64, [f64; 3]) {
+        if slope == [0.0; 3] {
+            // A sensor that sees no wall says nothing of the pose.
+            let scale = 1.0 / noise_variance.sqrt();
+            return (missed * scale, scale, slope);
+        }
         let innovation = missed - (0..3).map(|axis| slope[axis] * self.moved[axis]).sum::<f64>();
         let p = &mut self.covariance;
         let across: [f64; 3] =
             std::array::from_fn(|i| p[i][0] * slope[0] + p[i][1] * slope[1] + p[i][2] * slope[2]);
         let variance = slope[0] * across[0] + slope[1] * across[1] + slope[2] * across[2] + noise_variance;
-        let gain = across.map(|a| a / variance);
+        let scale = 1.0 / variance.sqrt();
+        let gain = across.map(|a| a * (scale * scale));
         for i in 0..3 {
             for j in 0..3 {
                 p[i][j] -= gain[i] * across[j];
             }
         }
         (0..3).for_each(|axis| self.moved[axis] += gain[axis] * innovation);
-        (innovation / variance.sqrt(), 1.0 / variance.sqrt(), gain)
+        (innovation * scale, scale, gain)
     }
 
     /// Moves the pose by what was measured.
@@ -327,21 +333,20 @@ fn sense(
 /// Which readings the poses of a trace let count: those whose ray is neither near the end of the range nor near the
 /// silhouette of a wall. Decided once, so that every model is judged on the same numbers.
 pub(crate) fn clear_readings(world: &World<'_>, trace: &Trace, rows: &[LogRow]) -> Vec<Used> {
-    let Ok(mut forecast) = Forecast::new(world) else {
+    let Ok(forecast) = Forecast::new(world) else {
         return vec![0; rows.len()];
     };
     let range_m = forecast.machine().range_m;
-    let still = [[0.0; 3]; 3];
     (trace.instants.iter().zip(rows).enumerate())
         .map(|(i, (instant, row))| {
             let mut used = available(row, i);
-            let mut distances_from = |by: [f64; 3]| {
-                let mut state = State::new(instant.moved_from, still);
+            let distances_from = |by: [f64; 3]| {
+                let mut state = State::new(instant.moved_from, [[0.0; 3]; 3]);
                 state.shift(by);
-                forecast.readings(state.pose, &still).look.distance_m
+                forecast.distances_m(state.pose)
             };
             let turned = [-SILHOUETTE_RAD, SILHOUETTE_RAD].map(|by| distances_from([0.0, 0.0, by]));
-            let about = ABOUT.map(&mut distances_from);
+            let about = ABOUT.map(distances_from);
             for lane in 0..8 {
                 let at = instant.look.distance_m[lane];
                 let edge = (at - range_m).abs() < EDGE_M + 2.0 * instant.look.deviation_m[lane];
@@ -373,13 +378,11 @@ const OFF_RAD: f64 = 0.03;
 pub(crate) fn reaches_elsewhere(world: &World<'_>, other: &World<'_>, trace: &Trace) -> bool {
     const EVERY: usize = 50;
     const ALIKE_M: f64 = 1e-5;
-    let (Ok(mut own), Ok(mut other)) = (Forecast::new(world), Forecast::new(other)) else {
+    let (Ok(own), Ok(other)) = (Forecast::new(world), Forecast::new(other)) else {
         return false;
     };
-    let still = [[0.0; 3]; 3];
     trace.instants.iter().step_by(EVERY).any(|instant| {
-        let [own, other] = [&mut own, &mut other]
-            .map(|forecast| forecast.readings(instant.moved_from, &still).look.distance_m);
+        let [own, other] = [&own, &other].map(|forecast| forecast.distances_m(instant.moved_from));
         own.iter().zip(&other).any(|(a, b)| (a - b).abs() > ALIKE_M)
     })
 }

@@ -26,8 +26,15 @@ pub(crate) fn cut(mean: f64, deviation: f64, step: f64) -> Cut {
             open: 1.0,
         };
     }
-    let open = 0.5 * erfc(-z * std::f64::consts::FRAC_1_SQRT_2);
-    let density = (-0.5 * z * z).exp() / std::f64::consts::TAU.sqrt();
+    // Most sensors see no wall.
+    let (open, density) = if z == 0.0 {
+        (0.5, 1.0 / std::f64::consts::TAU.sqrt())
+    } else {
+        (
+            0.5 * erfc(-z * std::f64::consts::FRAC_1_SQRT_2),
+            (-0.5 * z * z).exp() / std::f64::consts::TAU.sqrt(),
+        )
+    };
     let first = mean * open + deviation * density;
     let second = (mean * mean + deviation * deviation) * open + mean * deviation * density;
     Cut {

@@ -214,36 +214,29 @@ pub(crate) fn with_memory(answer: &Refined) -> Option<Refined> {
     Some(twin)
 }
 
-/// The same with the error of its noise effect's factor, if it has one, as large as fits to simulated logs of the answer
-/// scatter (a parametric bootstrap; Efron and Tibshirani 1993). Large noise takes the robot far from the pose about which the
-/// filter is linear: its innovations have heavy tails, and the likelihood is sharper than it should be.
-pub(crate) fn with_honest_factor(evidence: &Evidence<'_>, mut refined: Refined) -> Refined {
-    let is_noise = |setting: &Setting| NOISES.contains(&setting.spec.name);
-    let Some(place) = refined.settings.iter().position(is_noise) else {
-        return refined;
-    };
-    let mut others = refined.settings.clone();
+/// Whether a setting is one of an effect on noise.
+pub(crate) fn is_noise(setting: &Setting) -> bool {
+    NOISES.contains(&setting.spec.name)
+}
+
+/// The place of the noise effect among settings, if there is one, with its factor fitted to other logs from where it is.
+pub(crate) fn factor_again(evidence: &Evidence<'_>, settings: &[Setting]) -> Option<(usize, f64)> {
+    let place = settings.iter().position(is_noise)?;
+    let mut others = settings.to_vec();
     let noise = others.remove(place);
     let Pattern::Constant(values) = &noise.pattern else {
-        return refined;
+        return None;
     };
-    let middle = values[0].ln();
-    let off = repeats(evidence, &refined.settings, |repeated| {
-        let base = repeated.likelihood(&others)?;
-        let start = Factor {
-            spec: noise.spec,
-            gain: repeated.likelihood(&refined.settings)? - base,
-            middle,
-            half: 0.08,
-        };
-        Some(start.best(repeated, &others, base)?.middle - middle)
-    });
-    if !off.is_empty() {
-        let square = off.iter().map(|off| off * off).sum::<f64>() / off.len() as f64;
-        let error = &mut refined.standard_errors[place][0];
-        *error = error.max(values[0] * square.sqrt());
-    }
-    refined
+    let base = evidence.likelihood(&others)?;
+    let mut factor = Factor {
+        spec: noise.spec,
+        gain: evidence.likelihood(settings)? - base,
+        middle: values[0].ln(),
+        half: 0.08,
+    };
+    // One parabola: the best is near.
+    let _ = factor.round(evidence, &others, base)?;
+    Some((place, factor.middle.exp()))
 }
 
 #[cfg(test)]

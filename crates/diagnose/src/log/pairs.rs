@@ -75,7 +75,7 @@ fn gram(
         count += own.len();
     }
     let flat: Vec<&Setting> = settings.iter().flatten().collect();
-    let normals: Vec<Normal> = (runs.iter())
+    let normals: Vec<Normal> = (runs.par_iter())
         .map(|(world, trace)| {
             let of_some = |some: &[&Setting]| columns_of(some.iter().copied(), world, trace);
             let columns: Vec<Vec<Vec<f32>>> = (flat.par_chunks(TOGETHER))

@@ -5,7 +5,7 @@ use sim::{Pattern, Setting};
 
 use super::catalogue::{Shape, Variant};
 use super::evidence::{Assessment, Evidence, Knob};
-use super::screen::solve;
+use super::screen::{Solution, solve};
 
 /// A candidate with its best values.
 #[derive(Debug, Clone)]
@@ -75,20 +75,10 @@ pub(crate) fn refine(
         if solution.gain.is_nan() || solution.gain <= 0.02 {
             break;
         }
-        let mut accepted = None;
-        for share in [1.0, 0.3, 0.08] {
-            let mut trial = settings.clone();
-            for (knob, multiple) in knobs.iter().zip(solution.multiples.iter()) {
-                trial = knob.turned(&trial, share * multiple);
-            }
-            if let Some(then) = evidence
-                .assess(&trial, &knobs)
-                .filter(|then| then.total() > now.total())
-            {
-                accepted = Some((trial, then));
-                break;
-            }
-        }
+        let accepted = trials(&settings, &knobs, &solution).find_map(|trial| {
+            let then = evidence.assess(&trial, &knobs)?;
+            (then.total() > now.total()).then_some((trial, then))
+        });
         let Some((trial, then)) = accepted else { break };
         let small = then.total() - now.total() < 0.01;
         (settings, now) = (trial, then);
@@ -97,6 +87,34 @@ pub(crate) fn refine(
         }
     }
     Some(fitted(settings, knobs, now))
+}
+
+/// The settings after one step of Gauss and Newton's method from where `now` was taken, which is as good as more of them from
+/// settings that are near the best (Lehmann and Casella, Theory of Point Estimation, 1998, section 6.4); the settings as they
+/// are if no step raises the log-likelihood.
+pub(crate) fn one_step(
+    evidence: &Evidence<'_>,
+    settings: &[Setting],
+    knobs: &[Knob],
+    now: &Assessment,
+) -> Vec<Setting> {
+    let (left, right) = pooled(now, knobs.len());
+    trials(settings, knobs, &solve(&left, &right))
+        .find(|trial| evidence.likelihood(trial).is_some_and(|then| then > now.total()))
+        .unwrap_or_else(|| settings.to_vec())
+}
+
+/// The settings at the end of a step, and at ever shorter parts of it.
+fn trials<'a>(
+    settings: &'a [Setting],
+    knobs: &'a [Knob],
+    step: &'a Solution,
+) -> impl Iterator<Item = Vec<Setting>> + 'a {
+    [1.0, 0.3, 0.08].into_iter().map(move |share| {
+        (knobs.iter().zip(step.multiples.iter())).fold(settings.to_vec(), |trial, (knob, multiple)| {
+            knob.turned(&trial, share * multiple)
+        })
+    })
 }
 
 fn fitted(settings: Vec<Setting>, knobs: Vec<Knob>, now: Assessment) -> Fitted {

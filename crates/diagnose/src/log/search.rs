@@ -1,13 +1,16 @@
 //! Which variants, in which pattern over runs and time, are worth a refinement, and which of those wins.
 
+use std::collections::BTreeSet;
+
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use sim::{Pattern, Setting, UNLISTED};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::catalogue::{Shape, Variant};
-use super::evidence::{Evidence, Knob};
-use super::refine::{Fitted, hunt, jumps, knobs, refine};
+use super::evidence::{Assessment, Evidence, Knob};
+use super::noise::{factor_again, is_noise};
+use super::refine::{Fitted, hunt, jumps, knobs, one_step, refine};
 use super::repeat::repeats;
 use super::screen::{Normal, solve};
 
@@ -190,6 +193,11 @@ impl Refined {
         trusted(self.gain, self.fitted, self.by) - price(self.fitted, self.by)
     }
 
+    /// The effects' names, whatever their order.
+    pub(crate) fn names(&self) -> BTreeSet<&'static str> {
+        self.settings.iter().map(|setting| setting.spec.name).collect()
+    }
+
     /// Refined by further steps from where it is; `base` is the log-likelihood of the declared model.
     pub(crate) fn further(
         self,
@@ -210,7 +218,7 @@ impl Refined {
         (self.settings.iter().enumerate())
             .filter(|(_, setting)| !jumps(setting) && !matches!(setting.pattern, Pattern::ByRun(_)))
             .filter_map(|(i, setting)| {
-                let variant = variants.iter().find(|v| v.spec == setting.spec)?;
+                let variant = Variant::of(setting, variants)?;
                 Some(knobs(variant, i, &setting.pattern))
             })
             .flatten()
@@ -218,24 +226,52 @@ impl Refined {
     }
 
     /// The settings fitted again to other evidence, from where they are; those that jump or go by run stay.
-    pub(crate) fn refit(&self, evidence: &Evidence<'_>, variants: &[Variant]) -> Vec<Setting> {
-        const STEPS: usize = 2;
+    fn refit(&self, evidence: &Evidence<'_>, variants: &[Variant]) -> Vec<Setting> {
         let knobs = self.knobs(variants);
-        if knobs.is_empty() || evidence.stretches.is_empty() {
-            return self.settings.clone();
+        match self.assessed(evidence, &knobs) {
+            Some(now) => one_step(evidence, &self.settings, &knobs, &now),
+            None => self.settings.clone(),
         }
-        refine(evidence, self.settings.clone(), knobs, STEPS)
-            .map_or_else(|| self.settings.clone(), |fitted| fitted.settings)
+    }
+
+    /// The settings fitted again without each of so many runs; those that jump or go by run stay.
+    pub(crate) fn refit_without_each(
+        &self,
+        evidence: &Evidence<'_>,
+        variants: &[Variant],
+        runs: usize,
+    ) -> Vec<Vec<Setting>> {
+        let knobs = self.knobs(variants);
+        let Some(now) = self.assessed(evidence, &knobs) else {
+            return vec![self.settings.clone(); runs];
+        };
+        let without = |run: usize| {
+            let others = evidence.without(run);
+            one_step(&others, &self.settings, &knobs, &now.without(run, evidence))
+        };
+        (0..runs).into_par_iter().map(without).collect()
+    }
+
+    /// How well the settings explain the logs; `None` where nothing of them can be fitted.
+    fn assessed(&self, evidence: &Evidence<'_>, knobs: &[Knob]) -> Option<Assessment> {
+        (!knobs.is_empty())
+            .then(|| evidence.assess(&self.settings, knobs))
+            .flatten()
     }
 
     /// The same with errors at least as large as those of fits to simulated logs of it (a parametric bootstrap; Efron and
-    /// Tibshirani 1993): the filter is linear about a pose, and readings near edges do not count.
+    /// Tibshirani 1993): the filter is linear about a pose, from which large noise takes the robot far, and readings near
+    /// edges do not count.
     pub(crate) fn with_honest_errors(mut self, evidence: &Evidence<'_>, variants: &[Variant]) -> Self {
-        if self.knobs(variants).is_empty() {
+        if self.knobs(variants).is_empty() && !self.settings.iter().any(is_noise) {
             return self;
         }
         let fits = repeats(evidence, &self.settings, |repeated| {
-            Some(self.refit(repeated, variants))
+            let mut fit = self.refit(repeated, variants);
+            if let Some((place, factor)) = factor_again(repeated, &self.settings) {
+                fit[place] = Setting::constant(fit[place].spec, [factor]);
+            }
+            Some(fit)
         });
         for (i, (setting, errors)) in self.settings.iter().zip(&mut self.standard_errors).enumerate() {
             for (j, (value, error)) in numbers(setting).iter().zip(errors).enumerate() {
@@ -386,13 +422,22 @@ fn by_runs(
 }
 
 /// Refines several settings together from where each of them was best alone.
-pub(crate) fn together(evidence: &Evidence<'_>, parts: &[(Variant, Setting)], base: f64) -> Option<Refined> {
+pub(crate) fn together(
+    evidence: &Evidence<'_>,
+    parts: &[(Variant, Setting)],
+    base: f64,
+    steps: usize,
+) -> Option<Refined> {
     let settings: Vec<Setting> = parts.iter().map(|(_, setting)| setting.clone()).collect();
     let knobs = (parts.iter().enumerate())
         .filter(|(_, (_, setting))| !jumps(setting))
         .flat_map(|(i, (variant, setting))| knobs(variant, i, &setting.pattern))
         .collect();
-    Some(refined(refine(evidence, settings, knobs, 6)?, base, By::Constant))
+    Some(refined(
+        refine(evidence, settings, knobs, steps)?,
+        base,
+        By::Constant,
+    ))
 }
 
 /// The variants' multiples in a joint solution as a setting.
