@@ -1,6 +1,6 @@
 //! The answer: which effects, how sure, what else it could be.
 
-use sim::Setting;
+use sim::{Pattern, Setting};
 
 use super::atlas::{Atlas, Simulate};
 use super::classes::most_probable_first;
@@ -148,7 +148,7 @@ fn explain(search: &Search<'_>, screened: &[Screened]) -> Vec<Found> {
     // Of an effect that jumps a descent finds the nearest good size, not the best.
     let jumps = found.first().is_some_and(|best| search.jumped(best));
     if !first_is(&found, |best| {
-        leaves_nothing_to_ask(best) || best.share > MOST && !jumps
+        leaves_nothing_to_ask(best) || best.share > MOST && !jumps && !goes_over_runs_or_time(best)
     }) {
         let scans = search.scans();
         if !scans.is_empty() {
@@ -164,7 +164,9 @@ fn explain(search: &Search<'_>, screened: &[Screened]) -> Vec<Found> {
     if !first_is(&found, |best| {
         fits(best) || suffices(best) && best.share >= ALL_BUT
     }) {
-        let leaves_next_to_nothing = first_is(&found, |best| best.share >= ENOUGH);
+        let leaves_next_to_nothing = first_is(&found, |best| {
+            best.share >= ENOUGH && !goes_over_runs_or_time(best)
+        });
         let pairs = if leaves_next_to_nothing {
             search.pairs_with(&found[0])
         } else {
@@ -197,6 +199,12 @@ fn explain(search: &Search<'_>, screened: &[Screened]) -> Vec<Found> {
         found = unless_steady(found, settling);
     }
     found
+}
+
+/// Whether an explanation has a size by run or by time, which may follow what a further effect does.
+fn goes_over_runs_or_time(best: &Explanation) -> bool {
+    let constant = |setting: &Setting| matches!(setting.pattern, Pattern::Constant(_));
+    !best.effects.iter().all(|effect| constant(&effect.setting))
 }
 
 fn first_is(found: &[Found], holds: impl Fn(&Explanation) -> bool) -> bool {

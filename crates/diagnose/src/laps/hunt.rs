@@ -5,9 +5,9 @@ use std::ops::Range;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::atlas::{Atlas, Simulate};
+use super::atlas::{Atlas, Simulate, White};
 use super::expectation::Expectation;
-use super::hypothesis::{Hypothesis, Part};
+use super::hypothesis::{Freedom, Hypothesis, Part};
 
 /// Data sets simulated at each size, at one spacing after the other.
 const CLOSER: [u64; 4] = [3, 4, 8, 8];
@@ -20,6 +20,8 @@ pub(super) struct Hunt {
     size: f64,
     /// How far off it may be.
     spacing: f64,
+    /// What the hypothesis' own numbers do, as orthonormal directions: they follow the size. None if they stay.
+    following: Vec<White>,
 }
 
 impl Atlas {
@@ -49,16 +51,19 @@ impl Atlas {
             self.evaluate(simulate, beside, CLOSER[0])?.expectation
         };
         let chance = self.layout.len() as f64;
-        let excess = self.white(data, &without).norm_squared() - chance;
+        let following = self.directions(simulate, beside);
+        let excess = without_directions(self.white(data, &without), &following).norm_squared() - chance;
         let sets = if excess < LITTLE * chance { PAIRS } else { ONE };
-        let (left, size) = least(&self.distances(simulate, data, beside, probe, &sizes, &sets))?;
-        let fair = left - chance < (1.0 - FAIR_SHARE) * excess;
-        let hunt = Hunt {
+        let mut hunt = Hunt {
             beside: beside.clone(),
             probe,
-            size,
-            spacing: size * (ratio - 1.0),
+            size: low,
+            spacing: 0.0,
+            following,
         };
+        let (left, size) = least(&self.distances(simulate, data, &hunt, &sizes, &sets))?;
+        (hunt.size, hunt.spacing) = (size, size * (ratio - 1.0));
+        let fair = left - chance < (1.0 - FAIR_SHARE) * excess;
         fair.then_some((left, hunt))
     }
 
@@ -73,7 +78,8 @@ impl Atlas {
         Some(hunt.beside.with(&Hypothesis::of(part)))
     }
 
-    /// A hypothesis whose effects that jump have better sizes beside the others as they are now.
+    /// A hypothesis whose effects that jump have better sizes beside the others, whose numbers may follow but are left as they
+    /// are: a further descent moves them.
     pub(super) fn hunt_again(
         &self,
         simulate: &Simulate<'_>,
@@ -81,9 +87,11 @@ impl Atlas {
         hypothesis: &Hypothesis,
     ) -> Option<Hypothesis> {
         /// Share of a size by which it may be off at most.
-        const OFF: f64 = 0.01;
-        let spacing = |size: f64, _: f64| OFF * size;
-        self.hunt_each(simulate, data, hypothesis, &CLOSER[1..], spacing)
+        const OFF: f64 = 0.04;
+        self.hunt_each(simulate, data, hypothesis, &CLOSER, |hunt| {
+            hunt.spacing = OFF * hunt.size;
+            hunt.following = self.directions(simulate, &hunt.beside);
+        })
     }
 
     /// The same within the errors of these sizes.
@@ -93,8 +101,10 @@ impl Atlas {
         data: &Expectation,
         hypothesis: &Hypothesis,
     ) -> Option<Hypothesis> {
-        let spacing = |_: f64, error: f64| 1.5 * error;
-        self.hunt_each(simulate, data, hypothesis, &CLOSER[..1], spacing)
+        const ERRORS: f64 = 1.5;
+        self.hunt_each(simulate, data, hypothesis, &CLOSER[..1], |hunt| {
+            hunt.spacing *= ERRORS
+        })
     }
 
     /// A hypothesis whose sizes that jump are those of a parabola over a wider neighbourhood, with errors of it: how rounding
@@ -112,14 +122,7 @@ impl Atlas {
             };
             let distances = |sizes: &[f64]| {
                 const SETS: u64 = 6;
-                self.distances(
-                    simulate,
-                    data,
-                    &hunt.beside,
-                    hunt.probe,
-                    sizes,
-                    &[0..SETS, 0..SETS],
-                )
+                self.distances(simulate, data, &hunt, sizes, &[0..SETS, 0..SETS])
             };
             if let Some((size, error)) = smooth_size(distances, hunt.size, hunt.spacing) {
                 smooth.parts[i] = Part::held(self, hunt.probe, size, error);
@@ -137,6 +140,7 @@ impl Atlas {
             probe: part.probe,
             size: part.values[0][self.probes[part.probe].size_index()],
             spacing: part.held?,
+            following: Vec::new(),
         })
     }
 
@@ -146,14 +150,14 @@ impl Atlas {
         data: &Expectation,
         hypothesis: &Hypothesis,
         levels: &[u64],
-        spacing: impl Fn(f64, f64) -> f64,
+        prepare: impl Fn(&mut Hunt),
     ) -> Option<Hypothesis> {
         let mut found = hypothesis.clone();
         for i in 0..found.parts.len() {
             let Some(mut hunt) = self.hunt_of(&found, i) else {
                 continue;
             };
-            hunt.spacing = spacing(hunt.size, hunt.spacing);
+            prepare(&mut hunt);
             found.parts[i] = self.hunt_closer(simulate, data, &hunt, levels)?;
         }
         Some(found)
@@ -171,14 +175,7 @@ impl Atlas {
         let mut last = Vec::new();
         for &sets in levels {
             let sizes: Vec<f64> = (-4..=4).map(|i| best + spacing * f64::from(i) / 3.0).collect();
-            last = self.distances(
-                simulate,
-                data,
-                &hunt.beside,
-                hunt.probe,
-                &sizes,
-                &[0..sets, 0..sets],
-            );
+            last = self.distances(simulate, data, hunt, &sizes, &[0..sets, 0..sets]);
             best = least(&last)?.1;
             spacing /= 3.0;
         }
@@ -192,26 +189,26 @@ impl Atlas {
         Some(Part::held(self, hunt.probe, best, error))
     }
 
-    /// Squared distances of the data from a hypothesis with a probe at some sizes beside it, each with its size; sizes at
+    /// Squared distances of the data from a hunt's hypothesis with its probe at some sizes, each with its size; sizes at
     /// which the robot crashes are left out. A distance is told along what two simulations leave: if these are different data
     /// sets, their noise adds nothing to it on average.
     fn distances(
         &self,
         simulate: &Simulate<'_>,
         data: &Expectation,
-        beside: &Hypothesis,
-        probe: usize,
+        hunt: &Hunt,
         sizes: &[f64],
         sets: &[Range<u64>; 2],
     ) -> Vec<(f64, f64)> {
-        let others = beside.settings(self);
+        let others = hunt.beside.settings(self);
         let same_draws = sets.clone().map(|sets| self.declared_mean(sets));
         let distance = |&size: &f64| {
             let mut settings = others.clone();
-            settings.push(self.probes[probe].setting(size));
+            settings.push(self.probes[hunt.probe].setting(size));
             let left = |i: usize| {
                 let found = self.simulated_plainly(simulate, &settings, sets[i].clone())?;
-                Some(self.white(data, &found.moved(1.0, &same_draws[i], &self.null)))
+                let left = self.white(data, &found.moved(1.0, &same_draws[i], &self.null));
+                Some(without_directions(left, &hunt.following))
             };
             let first = left(0)?;
             let square = if sets[0] == sets[1] {
@@ -223,6 +220,33 @@ impl Atlas {
         };
         sizes.par_iter().filter_map(distance).collect()
     }
+
+    /// What the numbers of a hypothesis do, as orthonormal directions.
+    fn directions(&self, simulate: &Simulate<'_>, hypothesis: &Hypothesis) -> Vec<White> {
+        const SETS: u64 = 4;
+        let action = |freedom: &Freedom| {
+            let at = |by: f64| {
+                let moved = hypothesis.moved(self, &[(*freedom, by)]);
+                self.simulated_plainly(simulate, &moved.settings(self), 0..SETS)
+            };
+            Some(self.white(&at(freedom.step)?, &at(-freedom.step)?))
+        };
+        let mut directions: Vec<White> = Vec::new();
+        for action in hypothesis.freedoms(self).iter().filter_map(action) {
+            let new = without_directions(action, &directions);
+            directions.extend(new.try_normalize(f64::MIN_POSITIVE));
+        }
+        directions
+    }
+}
+
+/// A vector less its components along orthonormal directions.
+fn without_directions(mut vector: White, directions: &[White]) -> White {
+    for direction in directions {
+        let along = direction.dot(&vector);
+        vector.axpy(-along, direction, 1.0);
+    }
+    vector
 }
 
 /// The least of some distances, with its size.

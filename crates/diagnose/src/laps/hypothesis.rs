@@ -136,6 +136,12 @@ impl Part {
         }
     }
 
+    /// Whether a size that was found by trying many is within its error of another one.
+    pub(super) fn is_within_error_of(&self, other: &Self) -> bool {
+        let sizes = self.values.iter().flatten().zip(other.values.iter().flatten());
+        (self.held).is_none_or(|error| sizes.into_iter().all(|(a, b)| (a - b).abs() <= error))
+    }
+
     /// A probe at a size that was found by trying many, to within an error.
     pub(super) fn held(atlas: &Atlas, probe: usize, size: f64, error: f64) -> Self {
         Self {

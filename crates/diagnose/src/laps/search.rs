@@ -479,24 +479,34 @@ impl Search<'_> {
     }
 
     /// Descents with better sizes of the effects that jump, which were found beside others that have moved since: those of
-    /// the best descent, for all.
-    fn hunted_again(&self, descents: Vec<Descent>) -> Vec<Descent> {
-        let best = best_of(&descents);
+    /// the best descent, for all, until they come to rest.
+    fn hunted_again(&self, mut descents: Vec<Descent>) -> Vec<Descent> {
+        const MOST: usize = 3;
         let held = |part: &Part| part.held.is_some();
-        let several =
-            best.filter(|best| best.hypothesis.parts.len() > 1 && best.hypothesis.parts.iter().any(held));
-        let hunted =
-            several.and_then(|best| self.atlas.hunt_again(self.simulate, self.data, &best.hypothesis));
-        let Some(hunted) = hunted else {
-            return descents;
-        };
-        let known: Vec<Part> = hunted.parts.into_iter().filter(held).collect();
-        (descents.into_par_iter())
-            .filter_map(|descent| {
-                let start = Descent::start(self.atlas, &descent.hypothesis.with_held(&known));
-                self.atlas.descend(self.simulate, self.data, start, Round::Full)
-            })
-            .collect()
+        for _ in 0..MOST {
+            let several = best_of(&descents)
+                .map(|best| &best.hypothesis)
+                .filter(|best| best.parts.len() > 1 && best.parts.iter().any(held));
+            let Some((before, hunted)) = several.and_then(|best| {
+                let hunted = self.atlas.hunt_again(self.simulate, self.data, best)?;
+                Some((best.clone(), hunted))
+            }) else {
+                break;
+            };
+            let rest =
+                (hunted.parts.iter().zip(&before.parts)).all(|(now, before)| now.is_within_error_of(before));
+            let known: Vec<Part> = hunted.parts.into_iter().filter(held).collect();
+            descents = (descents.into_par_iter())
+                .filter_map(|descent| {
+                    let start = Descent::start(self.atlas, &descent.hypothesis.with_held(&known));
+                    self.atlas.descend(self.simulate, self.data, start, Round::Full)
+                })
+                .collect();
+            if rest {
+                break;
+            }
+        }
+        descents
     }
 
     /// Simulates the best hypothesis more often, and still more if others explain nearly as much; not if all leave far too
