@@ -29,8 +29,8 @@ const TOO_LITTLE: f64 = 0.7;
 const AS_GOOD: f64 = 0.01;
 /// Log-likelihood that each number of a further effect must gain.
 const WORTH: f64 = 10.0;
-/// The same where what comes before stands without it.
-const WORTH_BESIDE: f64 = 30.0;
+/// The same where what comes before stands without it, and the share of what that gains: no model is exact.
+const WORTH_BESIDE: (f64, f64) = (15.0, 0.001);
 /// Share of what is explained already that further effects which do not fit either must gain: at very high signal no model is
 /// exact.
 const FAULTS: f64 = 0.001;
@@ -161,19 +161,15 @@ fn explain(search: &Search<'_>, screened: &[Screened]) -> Vec<Found> {
         found.extend(search.patterns(&found));
         sort(&mut found);
     }
-    if !first_is(&found, |best| {
-        fits(best) || suffices(best) && best.share >= ALL_BUT
-    }) {
-        let leaves_next_to_nothing = first_is(&found, |best| {
-            best.share >= ENOUGH && !goes_over_runs_or_time(best)
-        });
-        let pairs = if leaves_next_to_nothing {
-            search.pairs_with(&found[0])
-        } else {
-            search.pairs(&found)
-        };
-        found = preferred(found, pairs);
-    }
+    let stands = |best: &Explanation| fits(best) || suffices(best) && best.share >= ALL_BUT;
+    let leaves_next_to_nothing = |best: &Explanation| best.share >= ENOUGH && !goes_over_runs_or_time(best);
+    let stands = first_is(&found, stands);
+    let pairs = if stands || first_is(&found, leaves_next_to_nothing) {
+        search.pairs_with(&found[0], stands)
+    } else {
+        search.pairs(&found)
+    };
+    found = preferred(found, pairs);
     if !first_is(&found, |best| suffices(best) || best.share > MOST) {
         let beside = search.scans_beside(&found);
         found = preferred(found, beside);
@@ -257,8 +253,12 @@ fn preferred(fewer: Vec<Found>, more: Vec<Found>) -> Vec<Found> {
     let numbers = count(further).saturating_sub(count(first)).max(1) as f64;
     let better = fits(b) || b.share >= ALL_BUT || !suffices(a) && b.share > a.share;
     let faults = if fits(b) { 0.0 } else { FAULTS * a.gain };
-    let worth = if suffices(a) { WORTH_BESIDE } else { WORTH };
-    let wins = b.gain - a.gain > (worth * numbers).max(faults) && better && !heaps_noise(b);
+    let worth = if suffices(a) {
+        (WORTH_BESIDE.0 * numbers).max(WORTH_BESIDE.1 * a.gain)
+    } else {
+        WORTH * numbers
+    };
+    let wins = b.gain - a.gain > worth.max(faults) && better && !heaps_noise(b);
     with_first(wins, more, fewer)
 }
 

@@ -8,6 +8,7 @@ use rayon::prelude::*;
 use super::atlas::{Atlas, Simulate, White};
 use super::expectation::Expectation;
 use super::hypothesis::{Freedom, Hypothesis, Part};
+use super::screen::without_directions;
 
 /// Data sets simulated at each size, at one spacing after the other.
 const CLOSER: [u64; 4] = [3, 4, 8, 8];
@@ -222,7 +223,7 @@ impl Atlas {
     }
 
     /// What the numbers of a hypothesis do, as orthonormal directions.
-    fn directions(&self, simulate: &Simulate<'_>, hypothesis: &Hypothesis) -> Vec<White> {
+    pub(super) fn directions(&self, simulate: &Simulate<'_>, hypothesis: &Hypothesis) -> Vec<White> {
         const SETS: u64 = 4;
         let action = |freedom: &Freedom| {
             let at = |by: f64| {
@@ -238,15 +239,6 @@ impl Atlas {
         }
         directions
     }
-}
-
-/// A vector less its components along orthonormal directions.
-fn without_directions(mut vector: White, directions: &[White]) -> White {
-    for direction in directions {
-        let along = direction.dot(&vector);
-        vector.axpy(-along, direction, 1.0);
-    }
-    vector
 }
 
 /// The least of some distances, with its size.

@@ -33,9 +33,18 @@ pub(super) fn price(parameters: usize, laps: usize) -> f64 {
 impl Atlas {
     /// Every probe in every pattern at its best size, best first.
     pub(super) fn screen(&self, residual: &White) -> Vec<Screened> {
+        self.screen_beside(residual, &[])
+    }
+
+    /// The same of what a hypothesis leaves whose own numbers follow, along these orthonormal directions.
+    pub(super) fn screen_beside(&self, left: &White, following: &[White]) -> Vec<Screened> {
+        let residual = &without_directions(left.clone(), following);
         let mut all: Vec<Screened> = (0..self.probes.len())
             .flat_map(|probe| {
-                let nodes = self.nodes(probe);
+                let mut nodes = self.nodes(probe);
+                for (_, action) in &mut nodes {
+                    *action = without_directions(std::mem::take(action), following);
+                }
                 [Shape::Constant, Shape::ByRun, Shape::ByTime]
                     .map(|shape| self.screen_one(probe, &nodes, shape, residual))
             })
@@ -156,6 +165,15 @@ impl Atlas {
             score,
         })
     }
+}
+
+/// A vector less its components along orthonormal directions.
+pub(super) fn without_directions(mut vector: White, directions: &[White]) -> White {
+    for direction in directions {
+        let along = direction.dot(&vector);
+        vector.axpy(-along, direction, 1.0);
+    }
+    vector
 }
 
 /// Share of a gain that faults of the paths may take: they are straight between few sizes.

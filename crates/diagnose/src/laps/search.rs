@@ -231,19 +231,29 @@ impl Search<'_> {
     }
 
     /// The best pairs of a single effect that explains nearly all, tried to the end: those with what explains best what it
-    /// leaves, if anything gains there what a further effect must.
-    pub(super) fn pairs_with(&self, single: &Found) -> Vec<Found> {
+    /// leaves, if anything gains there what a further effect must. Beside an effect that stands alone it must promise more, and
+    /// by one size: effects change the scatter, and sizes that go over the runs follow that.
+    pub(super) fn pairs_with(&self, single: &Found, stands: bool) -> Vec<Found> {
         /// Score of the least that could turn out to be worth its numbers.
         const PROMISING: f64 = 5.0;
-        let screened = self.atlas.screen(&single.left);
-        let promises = |other: &&Screened| {
-            !self.shares_effect(other, &single.hypothesis) && !self.jumps(&other.hypothesis)
+        const PROMISING_BESIDE: f64 = 10.0;
+        let constant = |hypothesis: &Hypothesis| {
+            let mut parts = hypothesis.parts.iter();
+            parts.all(|part| part.shape == Shape::Constant)
         };
+        let screened = self.screened_beside(&single.hypothesis, &single.left);
+        let promises = |other: &&Screened| {
+            !self.shares_effect(other, &single.hypothesis)
+                && !self.jumps(&other.hypothesis)
+                && (!stands || constant(&other.hypothesis))
+        };
+        let enough = if stands { PROMISING_BESIDE } else { PROMISING };
         let best = screened.iter().find(promises);
-        if best.is_none_or(|best| best.score < PROMISING) {
+        if best.is_none_or(|best| best.score < enough) {
             return Vec::new();
         }
-        let starts = self.beside(&single.hypothesis, &single.left, &[]);
+        let mut starts = self.beside(&single.hypothesis, &single.left, &[]);
+        starts.retain(|start| !stands || constant(start));
         self.pairs_from(&starts, &ROUNDS_BESIDE, single.explanation.score)
     }
 
@@ -313,7 +323,7 @@ impl Search<'_> {
     fn beside(&self, start: &Hypothesis, left: &White, tried: &[Hypothesis]) -> Vec<Hypothesis> {
         const FURTHER: usize = 3;
         let gain = 0.5 * (self.residual.norm_squared() - left.norm_squared());
-        let screened = self.atlas.screen(left);
+        let screened = self.screened_beside(start, left);
         let others = self.shortlist(&screened).into_iter();
         others
             .filter(|screened| !self.shares_effect(screened, start) && !self.jumps(&screened.hypothesis))
@@ -324,6 +334,12 @@ impl Search<'_> {
             .filter(|pair| !tried.iter().any(|other| other.probes() == pair.probes()))
             .take(FURTHER)
             .collect()
+    }
+
+    /// What explains best what a hypothesis leaves, whose numbers follow.
+    fn screened_beside(&self, start: &Hypothesis, left: &White) -> Vec<Screened> {
+        let following = self.atlas.directions(self.simulate, start);
+        self.atlas.screen_beside(left, &following)
     }
 
     /// The screened hypotheses worth a simulation: each probe in its best pattern, and without it, of one effect the best two.
