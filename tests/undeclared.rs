@@ -3,7 +3,7 @@
 use sim::{Effect, Machine, Moment, Param, Readings, Setting, Spec, Stage, Vec2, WheelSpeeds};
 
 use crate::support::Scratch;
-use crate::tracing::{Robot, holds, never_a_listed_name, says, share_signatures, trace};
+use crate::tracing::{GAINS, Robot, holds, names, never_a_listed_name, says, share_signatures, trace};
 
 /// A listed effect, written anew under another name.
 pub(crate) static LIMP: Spec = Spec {
@@ -168,6 +168,29 @@ fn a_marker_far_ahead_is_there_in_every_run() {
     let found = trace(&scratch, "braitenberg", "set", &[]);
     says(&found, "explained", &["marker-offset"]);
     assert!(found["effects"][0]["by"].is_null(), "{found:#}");
+}
+
+#[test]
+fn a_rounding_of_readings_is_found_beside_a_gain_that_hides_its_size() {
+    // Without a gain a rounding of 127 counts explains most.
+    const COUNTS: f64 = 122.4;
+    share_signatures("braitenberg");
+    let scratch = Scratch::new();
+    let mut robot = Robot::with(Setting::constant(sim::find("reading-step").unwrap(), [COUNTS]));
+    robot
+        .effects
+        .push(Setting::constant(sim::find("controller-gain").unwrap(), [1.156]));
+    robot.record(&scratch, "set");
+    let found = trace(&scratch, "braitenberg", "set", &[]);
+    assert_eq!(found["verdict"], "explained", "{found:#}");
+    let (step, gain) = match names(&found).as_slice() {
+        ["reading-step", gain] => (0, *gain),
+        [gain, "reading-step"] => (1, *gain),
+        _ => panic!("{found:#}"),
+    };
+    assert!(gain == "axle-length" || GAINS.contains(&gain), "{gain}");
+    let counts = found["effects"][step]["parameters"][0]["value"].as_f64().unwrap();
+    assert!((counts / COUNTS - 1.0).abs() < 0.01, "{counts}");
 }
 
 #[test]

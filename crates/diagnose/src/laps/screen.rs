@@ -243,3 +243,19 @@ fn piece(nodes: &[(f64, White)], size: f64) -> (&(f64, White), White) {
     let slope = (&nodes[i + 1].1 - &nodes[i].1) / (nodes[i + 1].0 - nodes[i].0);
     (&nodes[i], slope)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_follows_is_taken_off() {
+        let directions = [
+            White::from_vec(vec![1.0, 0.0, 0.0]),
+            White::from_vec(vec![0.0, 0.6, 0.8]),
+        ];
+        let left = without_directions(White::from_vec(vec![7.0, 3.0, -1.0]), &directions);
+        // (3, -1) less its projection of 1 on (0.6, 0.8).
+        assert!((left - White::from_vec(vec![0.0, 2.4, -1.8])).norm() < 1e-15);
+    }
+}
