@@ -161,7 +161,9 @@ fn explain(search: &Search<'_>, screened: &[Screened]) -> Vec<Found> {
         found.extend(search.patterns(&found));
         sort(&mut found);
     }
-    let stands = |best: &Explanation| fits(best) || suffices(best) && best.share >= ALL_BUT;
+    let stands = |best: &Explanation| {
+        (fits(best) || suffices(best) && best.share >= ALL_BUT) && !is_doubtful(best, TOO_LITTLE)
+    };
     let leaves_next_to_nothing = |best: &Explanation| best.share >= ENOUGH && !goes_over_runs_or_time(best);
     let stands = first_is(&found, stands);
     let pairs = if stands || first_is(&found, leaves_next_to_nothing) {
