@@ -29,9 +29,9 @@ const TOO_LITTLE: f64 = 0.7;
 const AS_GOOD: f64 = 0.01;
 /// Log-likelihood that each number of a further effect must gain.
 const WORTH: f64 = 10.0;
-/// The same where what comes before stands without it, and the share of what that gains: no model is exact.
-const WORTH_BESIDE: (f64, f64) = (15.0, 0.001);
-/// Share of what is explained already that further effects which do not fit either must gain: at very high signal no model is
+/// The same where what comes before stands without it.
+const WORTH_BESIDE: f64 = 15.0;
+/// Share of what is explained already that further effects must gain, unless they alone fit: at very high signal no model is
 /// exact.
 const FAULTS: f64 = 0.001;
 
@@ -58,6 +58,12 @@ fn suffices(explanation: &Explanation) -> bool {
         ENOUGH
     };
     fits(explanation) || explanation.share >= enough && leaves_more_likely_than(explanation, SURELY_P)
+}
+
+/// Whether an explanation needs no further effect.
+fn stands_alone(explanation: &Explanation) -> bool {
+    (fits(explanation) || suffices(explanation) && explanation.share >= ALL_BUT)
+        && !is_doubtful(explanation, TOO_LITTLE)
 }
 
 /// Whether nothing that is left calls for an effect that no descent finds.
@@ -161,15 +167,11 @@ fn explain(search: &Search<'_>, screened: &[Screened]) -> Vec<Found> {
         found.extend(search.patterns(&found));
         sort(&mut found);
     }
-    let stands = |best: &Explanation| {
-        (fits(best) || suffices(best) && best.share >= ALL_BUT) && !is_doubtful(best, TOO_LITTLE)
-    };
     let leaves_next_to_nothing = |best: &Explanation| best.share >= ENOUGH && !goes_over_runs_or_time(best);
-    let stands = first_is(&found, stands);
-    let pairs = if stands || first_is(&found, leaves_next_to_nothing) {
-        search.pairs_with(&found[0], stands)
-    } else {
-        search.pairs(&found)
+    let pairs = match found.first() {
+        Some(best) if stands_alone(&best.explanation) => search.pairs_with(best, true),
+        Some(best) if leaves_next_to_nothing(&best.explanation) => search.pairs_with(best, false),
+        _ => search.pairs(&found),
     };
     found = preferred(found, pairs);
     if !first_is(&found, |best| suffices(best) || best.share > MOST) {
@@ -201,8 +203,10 @@ fn explain(search: &Search<'_>, screened: &[Screened]) -> Vec<Found> {
 
 /// Whether an explanation has a size by run or by time, which may follow what a further effect does.
 fn goes_over_runs_or_time(best: &Explanation) -> bool {
-    let constant = |setting: &Setting| matches!(setting.pattern, Pattern::Constant(_));
-    !best.effects.iter().all(|effect| constant(&effect.setting))
+    !best
+        .settings()
+        .iter()
+        .all(|setting| matches!(setting.pattern, Pattern::Constant(_)))
 }
 
 fn first_is(found: &[Found], holds: impl Fn(&Explanation) -> bool) -> bool {
@@ -254,13 +258,13 @@ fn preferred(fewer: Vec<Found>, more: Vec<Found>) -> Vec<Found> {
     let (a, b) = (&first.explanation, &further.explanation);
     let numbers = count(further).saturating_sub(count(first)).max(1) as f64;
     let better = fits(b) || b.share >= ALL_BUT || !suffices(a) && b.share > a.share;
-    let faults = if fits(b) { 0.0 } else { FAULTS * a.gain };
-    let worth = if suffices(a) {
-        (WORTH_BESIDE.0 * numbers).max(WORTH_BESIDE.1 * a.gain)
+    let worth = if suffices(a) { WORTH_BESIDE } else { WORTH };
+    let faults = if fits(b) && !suffices(a) {
+        0.0
     } else {
-        WORTH * numbers
+        FAULTS * a.gain
     };
-    let wins = b.gain - a.gain > worth.max(faults) && better && !heaps_noise(b);
+    let wins = b.gain - a.gain > faults.max(worth * numbers) && better && !heaps_noise(b);
     with_first(wins, more, fewer)
 }
 

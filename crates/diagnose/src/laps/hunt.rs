@@ -13,26 +13,50 @@ use super::screen::without_directions;
 /// Data sets simulated at each size, at one spacing after the other.
 const CLOSER: [u64; 4] = [3, 4, 8, 8];
 
-/// A size of a probe that jumps, beside a hypothesis, about which a better one is to be found.
+/// What is there beside an effect that jumps.
+#[derive(Debug, Clone)]
+pub(super) struct Beside {
+    hypothesis: Hypothesis,
+    /// What its numbers do, as orthonormal directions: they follow the size of the effect that jumps. None if they stay.
+    following: Vec<White>,
+}
+
+impl Beside {
+    /// The declared model.
+    pub(super) fn nothing() -> Self {
+        Self {
+            hypothesis: Hypothesis { parts: Vec::new() },
+            following: Vec::new(),
+        }
+    }
+}
+
+/// A size of a probe that jumps about which a better one is to be found.
 #[derive(Debug, Clone)]
 pub(super) struct Hunt {
-    beside: Hypothesis,
+    beside: Beside,
     probe: usize,
     size: f64,
     /// How far off it may be.
     spacing: f64,
-    /// What the hypothesis' own numbers do, as orthonormal directions: they follow the size. None if they stay.
-    following: Vec<White>,
 }
 
 impl Atlas {
+    /// A hypothesis whose numbers follow the size of an effect beside it.
+    pub(super) fn followed(&self, simulate: &Simulate<'_>, hypothesis: Hypothesis) -> Beside {
+        Beside {
+            following: self.directions(simulate, &hypothesis),
+            hypothesis,
+        }
+    }
+
     /// An effect that jumps beside a hypothesis, at sizes all over its probe's range, and the squared distance that is left.
     /// `None` where no size explains a fair share of what the hypothesis leaves.
     pub(super) fn hunt(
         &self,
         simulate: &Simulate<'_>,
         data: &Expectation,
-        beside: &Hypothesis,
+        beside: &Beside,
         probe: usize,
     ) -> Option<(f64, Hunt)> {
         const COARSE: usize = 60;
@@ -46,26 +70,27 @@ impl Atlas {
         // Sizes in a constant ratio: what matters is how many steps fit into a speed or a reading.
         let ratio = (high / low).powf(1.0 / (COARSE - 1) as f64);
         let sizes: Vec<f64> = (0..COARSE).map(|i| low * ratio.powi(i as i32)).collect();
-        let without = if beside.parts.is_empty() {
+        let without = if beside.hypothesis.parts.is_empty() {
             self.null.clone()
         } else {
-            self.evaluate(simulate, beside, CLOSER[0])?.expectation
+            self.evaluate(simulate, &beside.hypothesis, CLOSER[0])?
+                .expectation
         };
         let chance = self.layout.len() as f64;
-        let following = self.directions(simulate, beside);
-        let excess = without_directions(self.white(data, &without), &following).norm_squared() - chance;
+        let left = without_directions(self.white(data, &without), &beside.following);
+        let excess = left.norm_squared() - chance;
         let sets = if excess < LITTLE * chance { PAIRS } else { ONE };
-        let mut hunt = Hunt {
-            beside: beside.clone(),
-            probe,
-            size: low,
-            spacing: 0.0,
-            following,
-        };
-        let (left, size) = least(&self.distances(simulate, data, &hunt, &sizes, &sets))?;
-        (hunt.size, hunt.spacing) = (size, size * (ratio - 1.0));
+        let (left, size) = least(&self.distances(simulate, data, (beside, probe), &sizes, &sets))?;
         let fair = left - chance < (1.0 - FAIR_SHARE) * excess;
-        fair.then_some((left, hunt))
+        fair.then(|| {
+            let hunt = Hunt {
+                beside: beside.clone(),
+                probe,
+                size,
+                spacing: size * (ratio - 1.0),
+            };
+            (left, hunt)
+        })
     }
 
     /// The hypothesis and the effect beside it, at the best of sizes ever closer to that of the hunt.
@@ -76,7 +101,7 @@ impl Atlas {
         hunt: &Hunt,
     ) -> Option<Hypothesis> {
         let part = self.hunt_closer(simulate, data, hunt, &CLOSER)?;
-        Some(hunt.beside.with(&Hypothesis::of(part)))
+        Some(hunt.beside.hypothesis.with(&Hypothesis::of(part)))
     }
 
     /// A hypothesis whose effects that jump have better sizes beside the others, whose numbers may follow but are left as they
@@ -91,7 +116,7 @@ impl Atlas {
         const OFF: f64 = 0.04;
         self.hunt_each(simulate, data, hypothesis, &CLOSER, |hunt| {
             hunt.spacing = OFF * hunt.size;
-            hunt.following = self.directions(simulate, &hunt.beside);
+            hunt.beside.following = self.directions(simulate, &hunt.beside.hypothesis);
         })
     }
 
@@ -103,9 +128,8 @@ impl Atlas {
         hypothesis: &Hypothesis,
     ) -> Option<Hypothesis> {
         const ERRORS: f64 = 1.5;
-        self.hunt_each(simulate, data, hypothesis, &CLOSER[..1], |hunt| {
-            hunt.spacing *= ERRORS
-        })
+        let wider = |hunt: &mut Hunt| hunt.spacing *= ERRORS;
+        self.hunt_each(simulate, data, hypothesis, &CLOSER[..1], wider)
     }
 
     /// A hypothesis whose sizes that jump are those of a parabola over a wider neighbourhood, with errors of it: how rounding
@@ -123,7 +147,13 @@ impl Atlas {
             };
             let distances = |sizes: &[f64]| {
                 const SETS: u64 = 6;
-                self.distances(simulate, data, &hunt, sizes, &[0..SETS, 0..SETS])
+                self.distances(
+                    simulate,
+                    data,
+                    (&hunt.beside, hunt.probe),
+                    sizes,
+                    &[0..SETS, 0..SETS],
+                )
             };
             if let Some((size, error)) = smooth_size(distances, hunt.size, hunt.spacing) {
                 smooth.parts[i] = Part::held(self, hunt.probe, size, error);
@@ -134,14 +164,16 @@ impl Atlas {
 
     /// The hunt that ended with a part of a hypothesis, as far off as its size may be; `None` of other parts.
     fn hunt_of(&self, hypothesis: &Hypothesis, part: usize) -> Option<Hunt> {
-        let mut beside = hypothesis.clone();
-        let part = beside.parts.remove(part);
+        let beside = Beside {
+            hypothesis: hypothesis.without(part),
+            following: Vec::new(),
+        };
+        let part = &hypothesis.parts[part];
         Some(Hunt {
             beside,
             probe: part.probe,
             size: part.values[0][self.probes[part.probe].size_index()],
             spacing: part.held?,
-            following: Vec::new(),
         })
     }
 
@@ -176,7 +208,13 @@ impl Atlas {
         let mut last = Vec::new();
         for &sets in levels {
             let sizes: Vec<f64> = (-4..=4).map(|i| best + spacing * f64::from(i) / 3.0).collect();
-            last = self.distances(simulate, data, hunt, &sizes, &[0..sets, 0..sets]);
+            last = self.distances(
+                simulate,
+                data,
+                (&hunt.beside, hunt.probe),
+                &sizes,
+                &[0..sets, 0..sets],
+            );
             best = least(&last)?.1;
             spacing /= 3.0;
         }
@@ -190,26 +228,26 @@ impl Atlas {
         Some(Part::held(self, hunt.probe, best, error))
     }
 
-    /// Squared distances of the data from a hunt's hypothesis with its probe at some sizes, each with its size; sizes at
+    /// Squared distances of the data from a hypothesis with a probe beside it at some sizes, each with its size; sizes at
     /// which the robot crashes are left out. A distance is told along what two simulations leave: if these are different data
     /// sets, their noise adds nothing to it on average.
     fn distances(
         &self,
         simulate: &Simulate<'_>,
         data: &Expectation,
-        hunt: &Hunt,
+        (beside, probe): (&Beside, usize),
         sizes: &[f64],
         sets: &[Range<u64>; 2],
     ) -> Vec<(f64, f64)> {
-        let others = hunt.beside.settings(self);
+        let others = beside.hypothesis.settings(self);
         let same_draws = sets.clone().map(|sets| self.declared_mean(sets));
         let distance = |&size: &f64| {
             let mut settings = others.clone();
-            settings.push(self.probes[hunt.probe].setting(size));
+            settings.push(self.probes[probe].setting(size));
             let left = |i: usize| {
                 let found = self.simulated_plainly(simulate, &settings, sets[i].clone())?;
                 let left = self.white(data, &found.moved(1.0, &same_draws[i], &self.null));
-                Some(without_directions(left, &hunt.following))
+                Some(without_directions(left, &beside.following))
             };
             let first = left(0)?;
             let square = if sets[0] == sets[1] {

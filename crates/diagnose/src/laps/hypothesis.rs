@@ -138,8 +138,8 @@ impl Part {
 
     /// Whether a size that was found by trying many is within its error of another one.
     pub(super) fn is_within_error_of(&self, other: &Self) -> bool {
-        let sizes = self.values.iter().flatten().zip(other.values.iter().flatten());
-        (self.held).is_none_or(|error| sizes.into_iter().all(|(a, b)| (a - b).abs() <= error))
+        let mut sizes = self.values.iter().flatten().zip(other.values.iter().flatten());
+        (self.held).is_none_or(|error| sizes.all(|(a, b)| (a - b).abs() <= error))
     }
 
     /// A probe at a size that was found by trying many, to within an error.
@@ -312,6 +312,11 @@ impl Hypothesis {
         self.parts.iter().any(|part| atlas.probes[part.probe].has_place())
     }
 
+    /// Whether no size goes over the runs or in time.
+    pub(super) fn is_constant(&self) -> bool {
+        self.parts.iter().all(|part| part.shape == Shape::Constant)
+    }
+
     /// A single constant effect with a size that goes over the runs or in time, from the same size; `None` for others.
     pub(super) fn over(&self, shape: Shape, atlas: &Atlas) -> Option<Self> {
         let [part] = self.parts.as_slice() else {
@@ -337,8 +342,7 @@ impl Hypothesis {
 
     /// The same with the mean size of every effect whose size goes over the runs or in time; `None` if none does.
     pub(super) fn without_patterns(&self, atlas: &Atlas) -> Option<Self> {
-        let patterned = self.parts.iter().any(|part| part.shape != Shape::Constant);
-        patterned.then(|| Self {
+        (!self.is_constant()).then(|| Self {
             parts: self.parts.iter().map(|part| part.plain(atlas)).collect(),
         })
     }

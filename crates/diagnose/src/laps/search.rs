@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::atlas::{Atlas, Simulate, White};
 use super::expectation::Expectation;
-use super::hunt::Hunt;
+use super::hunt::{Beside, Hunt};
 use super::hypothesis::{Freedom, Hypothesis, Part, Shape};
 use super::refine::{CLOSE_SETS, Descent, Round, Settled};
 use super::screen::Screened;
@@ -120,7 +120,7 @@ impl Search<'_> {
         let mut heard: Vec<&Screened> = Vec::new();
         for candidate in screened {
             let known = |other: &&Screened| probe(other).acts_like(probe(candidate));
-            let constant = candidate.hypothesis.parts[0].shape == Shape::Constant;
+            let constant = candidate.hypothesis.is_constant();
             let new = !listed.iter().any(known) && !heard.iter().any(known);
             let may_win = candidate.may_win(best, SHARE);
             if heard.len() < HEARD && may_win && constant && new && !self.jumps(&candidate.hypothesis) {
@@ -160,8 +160,7 @@ impl Search<'_> {
     }
 
     fn scan(&self, probe: usize) -> Option<Found> {
-        let nothing = Hypothesis { parts: Vec::new() };
-        let (_, hunt) = self.atlas.hunt(self.simulate, self.data, &nothing, probe)?;
+        let (_, hunt) = (self.atlas).hunt(self.simulate, self.data, &Beside::nothing(), probe)?;
         let found = self.atlas.hunted(self.simulate, self.data, &hunt)?;
         let end = Descent::start(self.atlas, &found);
         let settled = self.atlas.settle(self.simulate, self.data, &end)?;
@@ -182,11 +181,14 @@ impl Search<'_> {
             }
         }
         let mut hunts: Vec<(f64, Hunt)> = Vec::new();
-        for base in &bases {
-            for probe in self.jumping() {
-                if self.atlas.probes[base.parts[0].probe].spec != self.atlas.probes[probe].spec {
-                    hunts.extend(self.atlas.hunt(self.simulate, self.data, base, probe));
-                }
+        for base in bases {
+            let spec = self.atlas.probes[base.parts[0].probe].spec;
+            let base = self.atlas.followed(self.simulate, base);
+            for probe in self
+                .jumping()
+                .filter(|&probe| self.atlas.probes[probe].spec != spec)
+            {
+                hunts.extend(self.atlas.hunt(self.simulate, self.data, &base, probe));
             }
         }
         hunts.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -237,23 +239,19 @@ impl Search<'_> {
         /// Score of the least that could turn out to be worth its numbers.
         const PROMISING: f64 = 5.0;
         const PROMISING_BESIDE: f64 = 10.0;
-        let constant = |hypothesis: &Hypothesis| {
-            let mut parts = hypothesis.parts.iter();
-            parts.all(|part| part.shape == Shape::Constant)
-        };
         let screened = self.screened_beside(&single.hypothesis, &single.left);
         let promises = |other: &&Screened| {
             !self.shares_effect(other, &single.hypothesis)
                 && !self.jumps(&other.hypothesis)
-                && (!stands || constant(&other.hypothesis))
+                && (!stands || other.hypothesis.is_constant())
         };
         let enough = if stands { PROMISING_BESIDE } else { PROMISING };
         let best = screened.iter().find(promises);
         if best.is_none_or(|best| best.score < enough) {
             return Vec::new();
         }
-        let mut starts = self.beside(&single.hypothesis, &single.left, &[]);
-        starts.retain(|start| !stands || constant(start));
+        let mut starts = self.beside_of(&screened, &single.hypothesis, &single.left, &[]);
+        starts.retain(|start| !stands || start.is_constant());
         self.pairs_from(&starts, &ROUNDS_BESIDE, single.explanation.score)
     }
 
@@ -321,10 +319,20 @@ impl Search<'_> {
     /// A hypothesis with each of the effects that explain best what it leaves, but for those that were tried and for those
     /// that jump: [`Search::scans_beside`] is for these.
     fn beside(&self, start: &Hypothesis, left: &White, tried: &[Hypothesis]) -> Vec<Hypothesis> {
+        self.beside_of(&self.screened_beside(start, left), start, left, tried)
+    }
+
+    /// The same of what was screened already.
+    fn beside_of(
+        &self,
+        screened: &[Screened],
+        start: &Hypothesis,
+        left: &White,
+        tried: &[Hypothesis],
+    ) -> Vec<Hypothesis> {
         const FURTHER: usize = 3;
         let gain = 0.5 * (self.residual.norm_squared() - left.norm_squared());
-        let screened = self.screened_beside(start, left);
-        let others = self.shortlist(&screened).into_iter();
+        let others = self.shortlist(screened).into_iter();
         others
             .filter(|screened| !self.shares_effect(screened, start) && !self.jumps(&screened.hypothesis))
             .map(|other| (other.score, start.with(&other.hypothesis)))
@@ -367,7 +375,7 @@ impl Search<'_> {
             }
             let of_probe = |s: &&&Screened| probe(s) == probe(candidate);
             // A size by run may come first by the faults of a path alone.
-            let plain = |s: &Screened| s.hypothesis.parts[0].shape == Shape::Constant;
+            let plain = |s: &Screened| s.hypothesis.is_constant();
             let seen = list
                 .iter()
                 .filter(of_probe)
@@ -500,17 +508,15 @@ impl Search<'_> {
         const MOST: usize = 3;
         let held = |part: &Part| part.held.is_some();
         for _ in 0..MOST {
-            let several = best_of(&descents)
-                .map(|best| &best.hypothesis)
-                .filter(|best| best.parts.len() > 1 && best.parts.iter().any(held));
-            let Some((before, hunted)) = several.and_then(|best| {
-                let hunted = self.atlas.hunt_again(self.simulate, self.data, best)?;
-                Some((best.clone(), hunted))
-            }) else {
+            let best = best_of(&descents).map(|best| &best.hypothesis);
+            let Some(best) = best.filter(|best| best.parts.len() > 1 && best.parts.iter().any(held)) else {
+                break;
+            };
+            let Some(hunted) = self.atlas.hunt_again(self.simulate, self.data, best) else {
                 break;
             };
             let rest =
-                (hunted.parts.iter().zip(&before.parts)).all(|(now, before)| now.is_within_error_of(before));
+                (hunted.parts.iter().zip(&best.parts)).all(|(now, before)| now.is_within_error_of(before));
             let known: Vec<Part> = hunted.parts.into_iter().filter(held).collect();
             descents = (descents.into_par_iter())
                 .filter_map(|descent| {

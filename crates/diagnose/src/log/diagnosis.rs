@@ -130,14 +130,14 @@ struct Search<'a> {
     steps: usize,
     detectable: Vec<Detectable>,
     /// The last screening and its settings.
-    screened: Option<(Vec<Setting>, Screened<'a>)>,
+    screened: Option<(Vec<Setting>, Arc<Screened<'a>>)>,
 }
 
 /// Two effects, each with the setting where a refinement of both begins.
 type Parts = [(Variant, Setting); 2];
 
 /// Every run in its world, filtered, and the leads over them.
-type Screened<'a> = Arc<(Vec<(World<'a>, Trace)>, Vec<Lead>)>;
+type Screened<'a> = (Vec<(World<'a>, Trace)>, Vec<Lead>);
 
 impl<'a> Search<'a> {
     fn new(evidence: Evidence<'a>, step: Option<f64>) -> Result<Self, Error> {
@@ -175,14 +175,11 @@ impl<'a> Search<'a> {
     }
 
     /// The screening of all variants at given settings.
-    fn screen(&mut self, settings: &[Setting]) -> Option<Screened<'a>> {
+    fn screen(&mut self, settings: &[Setting]) -> Option<Arc<Screened<'a>>> {
         if let Some((_, found)) = self.screened.as_ref().filter(|last| last.0 == settings) {
             return Some(Arc::clone(found));
         }
-        let traces = self.evidence.traces(settings)?;
-        let normals = normals(&traces, &self.variants).ok()?;
-        let leads = leads(&self.evidence, &self.variants, &normals);
-        let found = Arc::new((traces, leads));
+        let found = Arc::new(screened(&self.evidence, settings, &self.variants)?);
         self.screened = Some((settings.to_vec(), Arc::clone(&found)));
         Some(found)
     }
@@ -492,8 +489,7 @@ impl<'a> Search<'a> {
     /// The group of basis functions that explains most, if it explains more than the best listed effects.
     fn characterise(&self, listed: f64) -> Option<Unnamed> {
         let groups = unlisted_variants();
-        let traces = self.evidence.traces(&[])?;
-        let found = leads(&self.evidence, &groups, &normals(&traces, &groups).ok()?);
+        let (_, found) = screened(&self.evidence, &[], &groups)?;
         let score = |lead: &Lead| lead.gain - price(lead.fitted, By::Constant);
         let most = found.iter().map(score).fold(0.0, f64::max);
         let lead = (found.iter())
@@ -729,10 +725,17 @@ fn constant(leads: &[Lead]) -> Vec<Lead> {
         .collect()
 }
 
+/// The logs filtered with settings, and what variants gain beside these.
+fn screened<'a>(evidence: &Evidence<'a>, settings: &[Setting], variants: &[Variant]) -> Option<Screened<'a>> {
+    let traces = evidence.traces(settings)?;
+    let normals = normals(&traces, variants).ok()?;
+    let leads = leads(evidence, variants, &normals);
+    Some((traces, leads))
+}
+
 /// The best score of some variants beside settings.
 fn most_left(evidence: &Evidence<'_>, settings: &[Setting], variants: &[Variant]) -> Option<f64> {
-    let normals = normals(&evidence.traces(settings)?, variants).ok()?;
-    Some(most(&leads(evidence, variants, &normals)))
+    screened(evidence, settings, variants).map(|(_, leads)| most(&leads))
 }
 
 /// The best score.
