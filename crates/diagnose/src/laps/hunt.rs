@@ -5,36 +5,18 @@ use std::ops::Range;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::atlas::{Atlas, Simulate, White};
+use super::atlas::{Atlas, Simulate};
+use super::beside::Base;
 use super::expectation::Expectation;
-use super::hypothesis::{Freedom, Hypothesis, Part};
-use super::screen::without_directions;
+use super::hypothesis::{Hypothesis, Part};
 
 /// Data sets simulated at each size, at one spacing after the other.
 const CLOSER: [u64; 4] = [3, 4, 8, 8];
 
-/// What is there beside an effect that jumps.
-#[derive(Debug, Clone)]
-pub(super) struct Beside {
-    hypothesis: Hypothesis,
-    /// What its numbers do, as orthonormal directions: they follow the size of the effect that jumps. None if they stay.
-    following: Vec<White>,
-}
-
-impl Beside {
-    /// The declared model.
-    pub(super) fn nothing() -> Self {
-        Self {
-            hypothesis: Hypothesis { parts: Vec::new() },
-            following: Vec::new(),
-        }
-    }
-}
-
 /// A size of a probe that jumps about which a better one is to be found.
 #[derive(Debug, Clone)]
 pub(super) struct Hunt {
-    beside: Beside,
+    base: Base,
     probe: usize,
     size: f64,
     /// How far off it may be.
@@ -42,21 +24,13 @@ pub(super) struct Hunt {
 }
 
 impl Atlas {
-    /// A hypothesis whose numbers follow the size of an effect beside it.
-    pub(super) fn followed(&self, simulate: &Simulate<'_>, hypothesis: Hypothesis) -> Beside {
-        Beside {
-            following: self.directions(simulate, &hypothesis),
-            hypothesis,
-        }
-    }
-
     /// An effect that jumps beside a hypothesis, at sizes all over its probe's range, and the squared distance that is left.
     /// `None` where no size explains a fair share of what the hypothesis leaves.
     pub(super) fn hunt(
         &self,
         simulate: &Simulate<'_>,
         data: &Expectation,
-        beside: &Beside,
+        base: &Base,
         probe: usize,
     ) -> Option<(f64, Hunt)> {
         const COARSE: usize = 60;
@@ -70,21 +44,19 @@ impl Atlas {
         // Sizes in a constant ratio: what matters is how many steps fit into a speed or a reading.
         let ratio = (high / low).powf(1.0 / (COARSE - 1) as f64);
         let sizes: Vec<f64> = (0..COARSE).map(|i| low * ratio.powi(i as i32)).collect();
-        let without = if beside.hypothesis.parts.is_empty() {
+        let without = if base.hypothesis.parts.is_empty() {
             self.null.clone()
         } else {
-            self.evaluate(simulate, &beside.hypothesis, CLOSER[0])?
-                .expectation
+            self.evaluate(simulate, &base.hypothesis, CLOSER[0])?.expectation
         };
         let chance = self.layout.len() as f64;
-        let left = without_directions(self.white(data, &without), &beside.following);
-        let excess = left.norm_squared() - chance;
+        let excess = base.beyond(self.white(data, &without)).norm_squared() - chance;
         let sets = if excess < LITTLE * chance { PAIRS } else { ONE };
-        let (left, size) = least(&self.distances(simulate, data, (beside, probe), &sizes, &sets))?;
+        let (left, size) = least(&self.distances(simulate, data, base, probe, &sizes, &sets))?;
         let fair = left - chance < (1.0 - FAIR_SHARE) * excess;
         fair.then(|| {
             let hunt = Hunt {
-                beside: beside.clone(),
+                base: base.clone(),
                 probe,
                 size,
                 spacing: size * (ratio - 1.0),
@@ -101,7 +73,7 @@ impl Atlas {
         hunt: &Hunt,
     ) -> Option<Hypothesis> {
         let part = self.hunt_closer(simulate, data, hunt, &CLOSER)?;
-        Some(hunt.beside.hypothesis.with(&Hypothesis::of(part)))
+        Some(hunt.base.hypothesis.with(&Hypothesis::of(part)))
     }
 
     /// A hypothesis whose effects that jump have better sizes beside the others, whose numbers may follow but are left as they
@@ -116,7 +88,7 @@ impl Atlas {
         const OFF: f64 = 0.04;
         self.hunt_each(simulate, data, hypothesis, &CLOSER, |hunt| {
             hunt.spacing = OFF * hunt.size;
-            hunt.beside.following = self.directions(simulate, &hunt.beside.hypothesis);
+            hunt.base = self.base(simulate, hunt.base.hypothesis.clone());
         })
     }
 
@@ -147,13 +119,7 @@ impl Atlas {
             };
             let distances = |sizes: &[f64]| {
                 const SETS: u64 = 6;
-                self.distances(
-                    simulate,
-                    data,
-                    (&hunt.beside, hunt.probe),
-                    sizes,
-                    &[0..SETS, 0..SETS],
-                )
+                self.distances(simulate, data, &hunt.base, hunt.probe, sizes, &[0..SETS, 0..SETS])
             };
             if let Some((size, error)) = smooth_size(distances, hunt.size, hunt.spacing) {
                 smooth.parts[i] = Part::held(self, hunt.probe, size, error);
@@ -164,13 +130,10 @@ impl Atlas {
 
     /// The hunt that ended with a part of a hypothesis, as far off as its size may be; `None` of other parts.
     fn hunt_of(&self, hypothesis: &Hypothesis, part: usize) -> Option<Hunt> {
-        let beside = Beside {
-            hypothesis: hypothesis.without(part),
-            following: Vec::new(),
-        };
+        let base = Base::at_rest(hypothesis.without(part));
         let part = &hypothesis.parts[part];
         Some(Hunt {
-            beside,
+            base,
             probe: part.probe,
             size: part.values[0][self.probes[part.probe].size_index()],
             spacing: part.held?,
@@ -211,7 +174,8 @@ impl Atlas {
             last = self.distances(
                 simulate,
                 data,
-                (&hunt.beside, hunt.probe),
+                &hunt.base,
+                hunt.probe,
                 &sizes,
                 &[0..sets, 0..sets],
             );
@@ -235,20 +199,14 @@ impl Atlas {
         &self,
         simulate: &Simulate<'_>,
         data: &Expectation,
-        (beside, probe): (&Beside, usize),
+        base: &Base,
+        probe: usize,
         sizes: &[f64],
         sets: &[Range<u64>; 2],
     ) -> Vec<(f64, f64)> {
-        let others = beside.hypothesis.settings(self);
-        let same_draws = sets.clone().map(|sets| self.declared_mean(sets));
         let distance = |&size: &f64| {
-            let mut settings = others.clone();
-            settings.push(self.probes[probe].setting(size));
-            let left = |i: usize| {
-                let found = self.simulated_plainly(simulate, &settings, sets[i].clone())?;
-                let left = self.white(data, &found.moved(1.0, &same_draws[i], &self.null));
-                Some(without_directions(left, &beside.following))
-            };
+            let further = [self.probes[probe].setting(size)];
+            let left = |i: usize| self.left_beside(simulate, data, base, &further, sets[i].clone());
             let first = left(0)?;
             let square = if sets[0] == sets[1] {
                 first.norm_squared()
@@ -258,24 +216,6 @@ impl Atlas {
             Some((square, size))
         };
         sizes.par_iter().filter_map(distance).collect()
-    }
-
-    /// What the numbers of a hypothesis do, as orthonormal directions.
-    pub(super) fn directions(&self, simulate: &Simulate<'_>, hypothesis: &Hypothesis) -> Vec<White> {
-        const SETS: u64 = 4;
-        let action = |freedom: &Freedom| {
-            let at = |by: f64| {
-                let moved = hypothesis.moved(self, &[(*freedom, by)]);
-                self.simulated_plainly(simulate, &moved.settings(self), 0..SETS)
-            };
-            Some(self.white(&at(freedom.step)?, &at(-freedom.step)?))
-        };
-        let mut directions: Vec<White> = Vec::new();
-        for action in hypothesis.freedoms(self).iter().filter_map(action) {
-            let new = without_directions(action, &directions);
-            directions.extend(new.try_normalize(f64::MIN_POSITIVE));
-        }
-        directions
     }
 }
 

@@ -142,6 +142,13 @@ impl Part {
         (self.held).is_none_or(|error| sizes.all(|(a, b)| (a - b).abs() <= error))
     }
 
+    /// The same with its size a multiple as far from the neutral one.
+    pub(super) fn times(&self, multiple: f64, atlas: &Atlas) -> Self {
+        let neutral = atlas.probes[self.probe].neutral;
+        let size = neutral + multiple * (self.mean_size(atlas) - neutral);
+        Self::screened(atlas, self.probe, Shape::Constant, &[size])
+    }
+
     /// A probe at a size that was found by trying many, to within an error.
     pub(super) fn held(atlas: &Atlas, probe: usize, size: f64, error: f64) -> Self {
         Self {

@@ -2,6 +2,7 @@
 
 mod atlas;
 mod baseline;
+mod beside;
 mod classes;
 mod detectable;
 mod diagnosis;

@@ -36,9 +36,8 @@ impl Atlas {
         self.screen_beside(residual, &[])
     }
 
-    /// The same of what a hypothesis leaves whose own numbers follow, along these orthonormal directions.
+    /// The same of what a hypothesis leaves beyond orthonormal directions, along which its own numbers follow.
     pub(super) fn screen_beside(&self, left: &White, following: &[White]) -> Vec<Screened> {
-        let residual = &without_directions(left.clone(), following);
         let mut all: Vec<Screened> = (0..self.probes.len())
             .flat_map(|probe| {
                 let mut nodes = self.nodes(probe);
@@ -46,7 +45,7 @@ impl Atlas {
                     *action = without_directions(std::mem::take(action), following);
                 }
                 [Shape::Constant, Shape::ByRun, Shape::ByTime]
-                    .map(|shape| self.screen_one(probe, &nodes, shape, residual))
+                    .map(|shape| self.screen_one(probe, &nodes, shape, left))
             })
             .flatten()
             .collect();
@@ -158,12 +157,19 @@ impl Atlas {
             }
         };
         let gain = residual.norm_squared() - (residual - &action).norm_squared();
-        let score =
-            worth(0.5 * gain, shape, FAULTS) - price(fitted, self.layout.total_laps()) - self.choice(probe);
         Some(Screened {
             hypothesis: Hypothesis::of(Part::screened(self, probe, shape, &size_at)),
-            score,
+            score: self.screened_score(probe, shape, fitted, 0.5 * gain),
         })
+    }
+
+    /// What counts of a gain of a constant probe.
+    pub(super) fn score_of_constant(&self, probe: usize, gain: f64) -> f64 {
+        self.screened_score(probe, Shape::Constant, self.probes[probe].free.len(), gain)
+    }
+
+    fn screened_score(&self, probe: usize, shape: Shape, fitted: usize, gain: f64) -> f64 {
+        worth(gain, shape, FAULTS) - price(fitted, self.layout.total_laps()) - self.choice(probe)
     }
 }
 

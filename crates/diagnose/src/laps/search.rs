@@ -4,8 +4,9 @@
 use rayon::prelude::*;
 
 use super::atlas::{Atlas, Simulate, White};
+use super::beside::Base;
 use super::expectation::Expectation;
-use super::hunt::{Beside, Hunt};
+use super::hunt::Hunt;
 use super::hypothesis::{Freedom, Hypothesis, Part, Shape};
 use super::refine::{CLOSE_SETS, Descent, Round, Settled};
 use super::screen::Screened;
@@ -148,7 +149,7 @@ impl Search<'_> {
     }
 
     /// Whether a hypothesis has an effect whose action jumps with its size.
-    fn jumps(&self, hypothesis: &Hypothesis) -> bool {
+    pub(super) fn jumps(&self, hypothesis: &Hypothesis) -> bool {
         let mut parts = hypothesis.parts.iter();
         parts.any(|part| self.atlas.probes[part.probe].jumps)
     }
@@ -160,7 +161,8 @@ impl Search<'_> {
     }
 
     fn scan(&self, probe: usize) -> Option<Found> {
-        let (_, hunt) = (self.atlas).hunt(self.simulate, self.data, &Beside::nothing(), probe)?;
+        let nothing = Base::at_rest(Hypothesis { parts: Vec::new() });
+        let (_, hunt) = (self.atlas).hunt(self.simulate, self.data, &nothing, probe)?;
         let found = self.atlas.hunted(self.simulate, self.data, &hunt)?;
         let end = Descent::start(self.atlas, &found);
         let settled = self.atlas.settle(self.simulate, self.data, &end)?;
@@ -183,7 +185,7 @@ impl Search<'_> {
         let mut hunts: Vec<(f64, Hunt)> = Vec::new();
         for base in bases {
             let spec = self.atlas.probes[base.parts[0].probe].spec;
-            let base = self.atlas.followed(self.simulate, base);
+            let base = self.atlas.base(self.simulate, base);
             for probe in self
                 .jumping()
                 .filter(|&probe| self.atlas.probes[probe].spec != spec)
@@ -226,7 +228,8 @@ impl Search<'_> {
         let screened = self.atlas.screen_pairs(self.residual, PAIRS);
         let mut starts: Vec<Hypothesis> = screened.into_iter().map(|pair| pair.hypothesis).collect();
         for single in singles.iter().take(2) {
-            let further = self.beside(&single.hypothesis, &single.left, &starts);
+            let base = self.atlas.base(self.simulate, single.hypothesis.clone());
+            let further = self.beside(&base, &single.left, &starts);
             starts.extend(further);
         }
         self.pairs_from(&starts, &ROUNDS_OF_SEVERAL, f64::NEG_INFINITY)
@@ -239,19 +242,14 @@ impl Search<'_> {
         /// Score of the least that could turn out to be worth its numbers.
         const PROMISING: f64 = 5.0;
         const PROMISING_BESIDE: f64 = 10.0;
-        let screened = self.screened_beside(&single.hypothesis, &single.left);
-        let promises = |other: &&Screened| {
-            !self.shares_effect(other, &single.hypothesis)
-                && !self.jumps(&other.hypothesis)
-                && (!stands || other.hypothesis.is_constant())
-        };
+        let base = self.atlas.base(self.simulate, single.hypothesis.clone());
+        let mut screened = self.screened_beside(&base, &single.left);
+        screened.retain(|other| !stands || other.hypothesis.is_constant());
         let enough = if stands { PROMISING_BESIDE } else { PROMISING };
-        let best = screened.iter().find(promises);
-        if best.is_none_or(|best| best.score < enough) {
+        if screened.first().is_none_or(|best| best.score < enough) {
             return Vec::new();
         }
-        let mut starts = self.beside_of(&screened, &single.hypothesis, &single.left, &[]);
-        starts.retain(|start| !stands || start.is_constant());
+        let starts = self.beside_of(screened, &base, &single.left, &[]);
         self.pairs_from(&starts, &ROUNDS_BESIDE, single.explanation.score)
     }
 
@@ -265,37 +263,13 @@ impl Search<'_> {
         self.settle(descents)
     }
 
-    /// A pair with either effect exchanged for those that explain best what the other one leaves, but for those pairs that
-    /// were tried: actions do not quite add up, and of effects that do about the same the best few were tried.
-    fn exchanged(&self, pair: &Descent, tried: &[Hypothesis]) -> Vec<Hypothesis> {
-        let parts = &pair.hypothesis.parts;
-        let mut all = tried.to_vec();
-        for kept in parts {
-            let alone = Hypothesis::of(kept.clone());
-            let Some(left) = self.left_by(&alone) else {
-                continue;
-            };
-            let others = self.beside(&alone, &left, &all);
-            all.extend(others);
-        }
-        all.split_off(tried.len())
-    }
-
-    /// What a hypothesis leaves of the data, in units of the declared model's scatter; `None` where the robot crashes.
-    fn left_by(&self, hypothesis: &Hypothesis) -> Option<White> {
-        const SETS: u64 = 10;
-        if hypothesis.parts.is_empty() {
-            return Some(self.residual.clone());
-        }
-        let evaluated = self.atlas.evaluate(self.simulate, hypothesis, SETS)?;
-        Some(self.atlas.white(self.data, &evaluated.expectation))
-    }
-
     /// Explanations with what explains best what they leave beside them, tried to the end.
     pub(super) fn further<'f>(&self, bases: impl Iterator<Item = &'f Found>) -> Vec<Found> {
         let mut starts: Vec<Hypothesis> = Vec::new();
         for base in bases {
-            let further = self.beside(&base.hypothesis, &base.left, &starts);
+            let left = &base.left;
+            let base = self.atlas.base(self.simulate, base.hypothesis.clone());
+            let further = self.beside(&base, left, &starts);
             starts.extend(further);
         }
         self.settle(self.descend_several(&starts, &ROUNDS_OF_SEVERAL, f64::NEG_INFINITY))
@@ -316,43 +290,9 @@ impl Search<'_> {
         descents
     }
 
-    /// A hypothesis with each of the effects that explain best what it leaves, but for those that were tried and for those
-    /// that jump: [`Search::scans_beside`] is for these.
-    fn beside(&self, start: &Hypothesis, left: &White, tried: &[Hypothesis]) -> Vec<Hypothesis> {
-        self.beside_of(&self.screened_beside(start, left), start, left, tried)
-    }
-
-    /// The same of what was screened already.
-    fn beside_of(
-        &self,
-        screened: &[Screened],
-        start: &Hypothesis,
-        left: &White,
-        tried: &[Hypothesis],
-    ) -> Vec<Hypothesis> {
-        const FURTHER: usize = 3;
-        let gain = 0.5 * (self.residual.norm_squared() - left.norm_squared());
-        let others = self.shortlist(screened).into_iter();
-        others
-            .filter(|screened| !self.shares_effect(screened, start) && !self.jumps(&screened.hypothesis))
-            .map(|other| (other.score, start.with(&other.hypothesis)))
-            // A pattern may cost more than all that a further effect gains.
-            .filter(|(score, pair)| pair.worth(gain + score) > start.worth(gain))
-            .map(|(_, pair)| pair)
-            .filter(|pair| !tried.iter().any(|other| other.probes() == pair.probes()))
-            .take(FURTHER)
-            .collect()
-    }
-
-    /// What explains best what a hypothesis leaves, whose numbers follow.
-    fn screened_beside(&self, start: &Hypothesis, left: &White) -> Vec<Screened> {
-        let following = self.atlas.directions(self.simulate, start);
-        self.atlas.screen_beside(left, &following)
-    }
-
     /// The screened hypotheses worth a simulation: each probe in its best pattern, and without it, of one effect the best two.
     /// What acts at a place was screened at a coarse grid of places with one length, and is given more room.
-    fn shortlist<'s>(&self, screened: &'s [Screened]) -> Vec<&'s Screened> {
+    pub(super) fn shortlist<'s>(&self, screened: &'s [Screened]) -> Vec<&'s Screened> {
         const MOST: usize = 7;
         const OF_ONE_EFFECT: usize = 2;
         let Some(best) = screened.first() else {
@@ -386,12 +326,6 @@ impl Search<'_> {
             }
         }
         list
-    }
-
-    fn shares_effect(&self, screened: &Screened, start: &Hypothesis) -> bool {
-        let spec = |part: &Part| self.atlas.probes[part.probe].spec;
-        let own = spec(&screened.hypothesis.parts[0]);
-        start.parts.iter().any(|part| spec(part) == own)
     }
 
     /// Causes without a name: the groups of basis functions that explain most with fewest coefficients, tried to the end.

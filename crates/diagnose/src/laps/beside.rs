@@ -1,0 +1,237 @@
+//! What explains best what a hypothesis leaves.
+
+use std::collections::BTreeMap;
+use std::ops::Range;
+
+use rayon::prelude::*;
+use sim::Setting;
+
+use super::atlas::{Atlas, Simulate, White};
+use super::expectation::Expectation;
+use super::hypothesis::{Freedom, Hypothesis, Part};
+use super::refine::Descent;
+use super::screen::{Screened, without_directions};
+use super::search::Search;
+
+/// A hypothesis beside which another effect is sought.
+#[derive(Debug, Clone)]
+pub(super) struct Base {
+    pub(super) hypothesis: Hypothesis,
+    /// What its numbers do, as orthonormal directions: they follow the other effect. None if they stay.
+    following: Vec<White>,
+}
+
+impl Base {
+    /// One whose numbers stay as they are.
+    pub(super) fn at_rest(hypothesis: Hypothesis) -> Self {
+        Self {
+            hypothesis,
+            following: Vec::new(),
+        }
+    }
+
+    /// What no change of its numbers explains.
+    pub(super) fn beyond(&self, left: White) -> White {
+        without_directions(left, &self.following)
+    }
+}
+
+impl Atlas {
+    /// A hypothesis whose numbers follow an effect beside it.
+    pub(super) fn base(&self, simulate: &Simulate<'_>, hypothesis: Hypothesis) -> Base {
+        Base {
+            following: self.directions(simulate, &hypothesis),
+            hypothesis,
+        }
+    }
+
+    /// What the numbers of a hypothesis do, as orthonormal directions.
+    pub(super) fn directions(&self, simulate: &Simulate<'_>, hypothesis: &Hypothesis) -> Vec<White> {
+        const SETS: u64 = 4;
+        let action = |freedom: &Freedom| {
+            let at = |by: f64| {
+                let moved = hypothesis.moved(self, &[(*freedom, by)]);
+                self.simulated_plainly(simulate, &moved.settings(self), 0..SETS)
+            };
+            Some(self.white(&at(freedom.step)?, &at(-freedom.step)?))
+        };
+        let mut directions: Vec<White> = Vec::new();
+        for action in hypothesis.freedoms(self).iter().filter_map(action) {
+            let new = without_directions(action, &directions);
+            directions.extend(new.try_normalize(f64::MIN_POSITIVE));
+        }
+        directions
+    }
+
+    /// What some simulated data sets leave of the data with further settings beside a base, but for what its numbers can
+    /// follow; `None` where the robot crashes.
+    pub(super) fn left_beside(
+        &self,
+        simulate: &Simulate<'_>,
+        data: &Expectation,
+        base: &Base,
+        further: &[Setting],
+        sets: Range<u64>,
+    ) -> Option<White> {
+        let mut settings = base.hypothesis.settings(self);
+        settings.extend_from_slice(further);
+        let same_draws = self.declared_mean(sets.clone());
+        let found = self.simulated_plainly(simulate, &settings, sets)?;
+        Some(base.beyond(self.white(data, &found.moved(1.0, &same_draws, &self.null))))
+    }
+}
+
+impl Search<'_> {
+    /// A base with each of the effects that explain best what it leaves, but for those that were tried and for those that
+    /// jump: [`Search::scans_beside`] is for these.
+    pub(super) fn beside(&self, base: &Base, left: &White, tried: &[Hypothesis]) -> Vec<Hypothesis> {
+        self.beside_of(self.screened_beside(base, left), base, left, tried)
+    }
+
+    /// The same of what was screened already.
+    pub(super) fn beside_of(
+        &self,
+        screened: Vec<Screened>,
+        base: &Base,
+        left: &White,
+        tried: &[Hypothesis],
+    ) -> Vec<Hypothesis> {
+        const FURTHER: usize = 3;
+        let gain = 0.5 * (self.residual.norm_squared() - left.norm_squared());
+        let start = &base.hypothesis;
+        let heard = self.heard_beside(base, screened);
+        (self.shortlist(&heard).into_iter())
+            .map(|other| (other.score, start.with(&other.hypothesis)))
+            // A pattern may cost more than all that a further effect gains.
+            .filter(|(score, pair)| pair.worth(gain + score) > start.worth(gain))
+            .map(|(_, pair)| pair)
+            .filter(|pair| !tried.iter().any(|other| other.probes() == pair.probes()))
+            .take(FURTHER)
+            .collect()
+    }
+
+    /// What explains best what a base leaves, by paths: effects of its own and those that jump are left out.
+    pub(super) fn screened_beside(&self, base: &Base, left: &White) -> Vec<Screened> {
+        let mut screened = self
+            .atlas
+            .screen_beside(&base.beyond(left.clone()), &base.following);
+        screened
+            .retain(|other| !self.shares_effect(other, &base.hypothesis) && !self.jumps(&other.hypothesis));
+        screened
+    }
+
+    /// The best of what was screened beside a base, at the sizes and with the scores that simulations give them: paths were
+    /// simulated without the base, and actions do not quite add up.
+    fn heard_beside(&self, base: &Base, screened: Vec<Screened>) -> Vec<Screened> {
+        const HEARD: usize = 24;
+        const OF_ONE_EFFECT: usize = 2;
+        const SHARE: f64 = 0.4;
+        /// Data sets whose noise is not the same.
+        const SETS: [Range<u64>; 2] = [0..4, 4..8];
+        let probe_of = |s: &Screened| s.hypothesis.parts[0].probe;
+        let spec_of = |probe: usize| self.atlas.probes[probe].spec;
+        let left = |further: &[Setting]| -> Option<[White; 2]> {
+            let left = |sets| {
+                self.atlas
+                    .left_beside(self.simulate, self.data, base, further, sets)
+            };
+            let [one, other] = SETS.map(left);
+            Some([one?, other?])
+        };
+        let (Some(first), Some(left_by_base)) = (screened.first(), left(&[])) else {
+            return screened;
+        };
+        let mut heard: Vec<usize> = Vec::new();
+        for candidate in screened
+            .iter()
+            .filter(|candidate| candidate.may_win(first, SHARE))
+        {
+            let probe = probe_of(candidate);
+            let alike = heard.iter().filter(|&&other| spec_of(other) == spec_of(probe));
+            if heard.len() < HEARD && !heard.contains(&probe) && alike.count() < OF_ONE_EFFECT {
+                heard.push(probe);
+            }
+        }
+        let simulated: BTreeMap<usize, Option<(f64, f64)>> = (heard.into_par_iter())
+            .map(|probe| {
+                let constant = |s: &&Screened| probe_of(s) == probe && s.hypothesis.is_constant();
+                let constant = screened.iter().find(constant);
+                let best = constant.and_then(|constant| {
+                    let with = left(&constant.hypothesis.settings(self.atlas))?;
+                    let [a, b] = [0, 1].map(|i| &left_by_base[i] - &with[i]);
+                    let product = 0.5 * (left_by_base[0].dot(&b) + left_by_base[1].dot(&a));
+                    let (multiple, gain) = best_multiple(product, a.dot(&b));
+                    let score = self.atlas.score_of_constant(probe, gain);
+                    Some((multiple, score - constant.score))
+                });
+                (probe, best)
+            })
+            .collect();
+        let corrected = |mut candidate: Screened| {
+            let probe = probe_of(&candidate);
+            let (multiple, change) = (*simulated.get(&probe)?)?;
+            candidate.score += change;
+            if candidate.hypothesis.is_constant() {
+                candidate.hypothesis.parts[0] = candidate.hypothesis.parts[0].times(multiple, self.atlas);
+            }
+            Some(candidate)
+        };
+        let mut all: Vec<Screened> = screened.into_iter().filter_map(corrected).collect();
+        all.sort_by(|a, b| b.score.total_cmp(&a.score));
+        all
+    }
+
+    /// A pair with either effect exchanged for those that explain best what the other one leaves, but for those pairs that
+    /// were tried: actions do not quite add up, and of effects that do about the same the best few were tried.
+    pub(super) fn exchanged(&self, pair: &Descent, tried: &[Hypothesis]) -> Vec<Hypothesis> {
+        let mut all = tried.to_vec();
+        for kept in &pair.hypothesis.parts {
+            let alone = Hypothesis::of(kept.clone());
+            if let Some(left) = self.left_by(&alone) {
+                let base = self.atlas.base(self.simulate, alone);
+                let others = self.beside(&base, &left, &all);
+                all.extend(others);
+            }
+        }
+        all.split_off(tried.len())
+    }
+
+    /// What a hypothesis leaves of the data, in units of the declared model's scatter; `None` where the robot crashes.
+    pub(super) fn left_by(&self, hypothesis: &Hypothesis) -> Option<White> {
+        const SETS: u64 = 10;
+        if hypothesis.parts.is_empty() {
+            return Some(self.residual.clone());
+        }
+        let evaluated = self.atlas.evaluate(self.simulate, hypothesis, SETS)?;
+        Some(self.atlas.white(self.data, &evaluated.expectation))
+    }
+
+    fn shares_effect(&self, screened: &Screened, start: &Hypothesis) -> bool {
+        let spec = |part: &Part| self.atlas.probes[part.probe].spec;
+        let own = spec(&screened.hypothesis.parts[0]);
+        start.parts.iter().any(|part| spec(part) == own)
+    }
+}
+
+/// The multiple of an action that explains most, by its product with what is to be explained and its square, and half the squared
+/// distance that it gains. It is not more than twice as much as was simulated.
+fn best_multiple(product: f64, square: f64) -> (f64, f64) {
+    const MOST: f64 = 2.0;
+    let multiple = (product / square.max(f64::MIN_POSITIVE)).clamp(0.0, MOST);
+    (multiple, multiple * product - 0.5 * multiple * multiple * square)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::best_multiple;
+
+    #[test]
+    fn a_multiple_is_the_vertex_of_a_parabola_within_bounds() {
+        // |(3, 4) - m (2, 0)|^2 is least at m = 1.5, and 9 less than at 0.
+        assert_eq!(best_multiple(6.0, 4.0), (1.5, 4.5));
+        assert_eq!(best_multiple(20.0, 4.0), (2.0, 32.0));
+        assert_eq!(best_multiple(-1.0, 4.0), (0.0, 0.0));
+        // Noise alone may make a square negative.
+        assert_eq!(best_multiple(-1.0, -0.5).0, 0.0);
+    }
+}
