@@ -234,6 +234,18 @@ fn an_offset_that_cuts_most_readings_is_one_effect_in_logs() {
 }
 
 #[test]
+fn readings_in_coarse_steps_are_nothing_else_in_logs() {
+    // Of which few multiples occur.
+    const COUNTS: f64 = 146.27;
+    let scratch = Scratch::new();
+    let step = Setting::constant(sim::find("reading-step").unwrap(), [COUNTS]);
+    Robot::with(step).logged(&[3; 3]).record(&scratch, "set");
+    let found = trace(&scratch, "braitenberg", "set", &[]);
+    says(&found, "explained", &["reading-step"]);
+    holds(&found["effects"][0], "counts", COUNTS, 0.0);
+}
+
+#[test]
 fn a_wall_that_is_elsewhere_is_one_effect_in_logs() {
     const DISTANCE_M: f64 = 0.0039;
     let scratch = Scratch::new();

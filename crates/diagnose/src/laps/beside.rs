@@ -123,7 +123,7 @@ impl Search<'_> {
     /// The best of what was screened beside a base, at the sizes and with the scores that simulations give them: paths were
     /// simulated without the base, and actions do not quite add up.
     fn heard_beside(&self, base: &Base, screened: Vec<Screened>) -> Vec<Screened> {
-        const HEARD: usize = 24;
+        const HEARD: usize = 16;
         const OF_ONE_EFFECT: usize = 2;
         const SHARE: f64 = 0.4;
         /// Data sets whose noise is not the same.

@@ -224,7 +224,7 @@ impl Search<'_> {
     /// The best pairs, tried to the end: those that together explain most as far as actions add up, and the best single
     /// effects with what explains their remainder best.
     pub(super) fn pairs(&self, singles: &[Found]) -> Vec<Found> {
-        const PAIRS: usize = 8;
+        const PAIRS: usize = 5;
         let screened = self.atlas.screen_pairs(self.residual, PAIRS);
         let mut starts: Vec<Hypothesis> = screened.into_iter().map(|pair| pair.hypothesis).collect();
         for single in singles.iter().take(2) {

@@ -12,7 +12,7 @@ use super::decide::{Decided, decided};
 use super::detectable::detectable;
 use super::evidence::Evidence;
 use super::filter::{MEASURED, Trace};
-use super::noise::{Factor, by_chance, noises, p_among_repeats, with_memory};
+use super::noise::{Factor, by_chance, noises, p_among, p_among_repeats, with_memory};
 use super::pairs::pairs;
 use super::recut::recut;
 use super::refine::jumps;
@@ -115,6 +115,9 @@ const SIGNIFICANT_P: f64 = 1e-3;
 /// Share of the explained log-likelihood that a remainder may have at very high signal.
 const MATTERS: f64 = 0.02;
 
+/// Leads that are refined.
+const PROMISING: usize = 8;
+
 /// The state of the search for effects.
 struct Search<'a> {
     evidence: Evidence<'a>,
@@ -189,7 +192,7 @@ impl<'a> Search<'a> {
         let leads = self.screen(&[])?.1.clone();
         self.detectable = detectable(&leads, &self.variants, ALARM);
         let noise = noises(&self.evidence, &[], self.total());
-        let by_mean = least_p(&leads);
+        let by_mean = self.p_by_mean(&leads);
         self.p = by_mean.min(if by_mean < ALARM {
             by_chance(&noise)
         } else {
@@ -198,12 +201,28 @@ impl<'a> Search<'a> {
         if self.p >= ALARM {
             return None;
         }
-        let list = self.promising(shortlist(&leads, &self.variants, 8));
+        let list = self.promising(shortlist(&leads, &self.variants, PROMISING));
         self.found = self.pursued(&list);
         self.sort();
         self.accept_noise(noise, &list);
         self.sort();
         Some(leads)
+    }
+
+    /// Probability of the best lead by chance. Readings in coarse steps are no normal numbers: where they were rounded, the
+    /// best leads are compared with what they gain in simulated logs too.
+    fn p_by_mean(&self, leads: &[Lead]) -> f64 {
+        /// What is no gain at all, so that logarithms of gains exist.
+        const LEAST: f64 = 1.0;
+        let p = least_p(leads);
+        if self.step.is_none() || p >= ALARM {
+            return p;
+        }
+        let best = self.variants_of(&shortlist(leads, &self.variants, PROMISING));
+        let logs = repeats(&self.evidence, &[], |repeated| {
+            Some(most_left(repeated, &[], &best)?.max(LEAST).ln())
+        });
+        p.max(p_among(most(leads).max(LEAST).ln(), &logs))
     }
 
     /// The leads refined: a few steps each, then to the end those that may still be the best.
@@ -255,6 +274,11 @@ impl<'a> Search<'a> {
             .filter(keeps)
             .map(|(lead, _)| lead)
             .collect()
+    }
+
+    fn variants_of(&self, leads: &[Lead]) -> Vec<Variant> {
+        let variant = |lead: &Lead| self.variants[lead.variant].clone();
+        leads.iter().map(variant).collect()
     }
 
     /// The effects of the best candidate; none if there is none.
@@ -326,9 +350,7 @@ impl<'a> Search<'a> {
         else {
             return;
         };
-        let promising: Vec<Variant> = (promising.iter())
-            .map(|lead| self.variants[lead.variant].clone())
-            .collect();
+        let promising = self.variants_of(promising);
         let hopes = |left: f64| left < HOPELESS * LEFT;
         if one.score() > best.max(4.0)
             && most_left(&self.evidence, &one.settings, &promising).is_some_and(hopes)

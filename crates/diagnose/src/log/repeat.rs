@@ -1,22 +1,27 @@
 //! Logs simulated of an answer: what becomes of them tells what to make of the measured ones.
 
 use rayon::prelude::*;
-use sim::{Run, Setting, Streams};
+use sim::{Run, Setting, Streams, find};
 
 use super::evidence::Evidence;
 use super::rows::LogRow;
 
-/// What `of` makes of logs of robots with these effects, eight times as many as were measured.
+/// What `of` makes of logs of robots with these effects, eight times as many as were measured, with readings rounded as the
+/// measured ones.
 pub(crate) fn repeats<R: Send>(
     evidence: &Evidence<'_>,
     settings: &[Setting],
     of: impl Fn(&Evidence<'_>) -> Option<R> + Sync,
 ) -> Vec<R> {
     const REPEATS: u64 = 8;
+    let mut rounded = settings.to_vec();
+    if evidence.step_counts > 0.0 {
+        rounded.extend(find("reading-step").map(|spec| Setting::constant(spec, [evidence.step_counts])));
+    }
     let one = |repeat: u64| {
-        let logs = simulated(evidence, settings, repeat)?;
+        let logs = simulated(evidence, &rounded, repeat)?;
         let runs: Vec<&[LogRow]> = logs.iter().map(Vec::as_slice).collect();
-        of(&Evidence::new(evidence.scene, evidence.model, &runs, 0.0).ok()?)
+        of(&Evidence::new(evidence.scene, evidence.model, &runs, evidence.step_counts).ok()?)
     };
     (0..REPEATS).into_par_iter().filter_map(one).collect()
 }

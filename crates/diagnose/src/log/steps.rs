@@ -27,11 +27,14 @@ pub(crate) fn reading_step(runs: &[&[LogRow]]) -> Option<f64> {
     Some(sharpened(&readings, guess))
 }
 
-/// Whether all readings lie within the file's rounding of multiples of something near the guess.
+/// Whether all readings lie within the file's rounding of multiples of something near the guess, which is known no better where
+/// few multiples occur.
 fn fits(readings: &[f64], guess: f64) -> bool {
+    const ROUNDING: f64 = 0.05;
+    const OFF: f64 = 2.2 * ROUNDING;
     let step = sharpened(readings, guess);
     let off = |reading: f64| (reading - (reading / step).round() * step).abs();
-    let near = readings.iter().filter(|&&reading| off(reading) < 0.06).count();
+    let near = readings.iter().filter(|&&reading| off(reading) < OFF).count();
     near as f64 > 0.98 * readings.len() as f64 && step > 0.45
 }
 
@@ -84,5 +87,20 @@ mod tests {
             assert!((found / step - 1.0).abs() < 1e-3, "{found} for {step}");
         }
         assert_eq!(reading_step(&[&rows(0.0)]), None);
+    }
+
+    #[test]
+    fn finds_a_step_of_which_two_multiples_occur() {
+        let of = |readings| LogRow {
+            time_s: 0.0,
+            observed: None,
+            readings,
+            command: WheelSpeeds::default(),
+        };
+        // Multiples of 146.27 as a file has them.
+        let mut rows = vec![of([0.0, 146.3, 0.0, 146.3, 146.3, 146.3, 146.3, 146.3]); 200];
+        rows.extend(vec![of([292.5, 146.3, 0.0, 0.0, 0.0, 146.3, 0.0, 0.0]); 40]);
+        let found = reading_step(&[&rows]).unwrap();
+        assert!((found / 146.27 - 1.0).abs() < 2e-4, "{found}");
     }
 }
