@@ -234,6 +234,17 @@ fn an_offset_that_cuts_most_readings_is_one_effect_in_logs() {
 }
 
 #[test]
+fn sensors_that_lag_have_their_time_in_logs() {
+    const TIME_S: f64 = 0.0752;
+    let scratch = Scratch::new();
+    let lag = Setting::constant(sim::find("sensor-lag").unwrap(), [TIME_S]);
+    Robot::with(lag).logged(&[6; 3]).record(&scratch, "set");
+    let found = trace(&scratch, "braitenberg", "set", &[]);
+    says(&found, "explained", &["sensor-lag"]);
+    holds(&found["effects"][0], "time_s", TIME_S, 0.0);
+}
+
+#[test]
 fn readings_in_coarse_steps_are_nothing_else_in_logs() {
     // Of which few multiples occur.
     const COUNTS: f64 = 146.27;

@@ -14,6 +14,9 @@ use crate::{Error, Machine, Pose, Readings, Setting, WheelSpeeds};
 /// A 3 x 3 matrix over x (m), y (m) and heading (rad), row by row.
 pub type PoseMatrix = [[f64; 3]; 3];
 
+/// Changes of the readings after all effects (rows) with those before (columns).
+type Passage = [[f64; LANES]; LANES];
+
 /// Where a control step leads.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Motion {
@@ -32,7 +35,9 @@ pub struct Forecast<'w> {
     apparatus: Apparatus<'w>,
     beside: Beside,
     /// What comes through of a small change of the readings; `None` for all of it.
-    through: Option<[[f64; LANES]; LANES]>,
+    through: Option<Passage>,
+    /// Share of a reading that is the last one's.
+    kept: f64,
     now: Moment,
 }
 
@@ -58,7 +63,7 @@ impl<'w> Forecast<'w> {
     /// An effect without values for this run.
     pub fn new(world: &'w World<'w>) -> Result<Self, Error> {
         let mut forecast = Self::beside(world, &[])?;
-        forecast.through = forecast.passage()?;
+        (forecast.through, forecast.kept) = forecast.passage()?;
         Ok(forecast)
     }
 
@@ -77,6 +82,7 @@ impl<'w> Forecast<'w> {
             apparatus: Apparatus::new(world, further)?,
             beside: Beside::Nothing,
             through: None,
+            kept: 0.0,
             now: Moment {
                 time_s: 0.0,
                 step_s: world.rules().control_step_s,
@@ -158,6 +164,12 @@ impl<'w> Forecast<'w> {
             }
         }
         outlook
+    }
+
+    /// Share of a reading that is the last one's, 0 where readings do not lag: what was wrong with that one is wrong with this one
+    /// by as much.
+    pub fn kept(&self) -> f64 {
+        self.kept
     }
 
     /// Distances along the sensors' axes from a pose, m; infinite where there is no wall.
@@ -295,15 +307,15 @@ impl<'w> Forecast<'w> {
         covariance
     }
 
-    /// What comes through of a small change of each reading: the effects on readings are straight lines in them, so
-    /// one difference from a second chain of effects, at its second reading, is exact.
-    fn passage(&self) -> Result<Option<[[f64; LANES]; LANES]>, Error> {
-        let second = |lane: Option<usize>| -> Result<Readings, Error> {
+    /// What comes through of a small change of each reading, and the share of a reading that is the last one's: the effects on
+    /// readings are straight lines in them, so one difference from a second chain of effects, at its second reading, is exact.
+    fn passage(&self) -> Result<(Option<Passage>, f64), Error> {
+        let second = |raised: Option<(usize, usize)>| -> Result<Readings, Error> {
             let mut effects = Active::all(&self.apparatus.world.model.effects, self.apparatus.world.run)?;
             let mut readings = [100.0; LANES];
             for step in 0..2 {
                 readings = [100.0; LANES];
-                if let (Some(lane), 1) = (lane, step) {
+                if let Some((_, lane)) = raised.filter(|(when, _)| *when == step) {
                     readings[lane] += 1.0;
                 }
                 for active in &mut effects {
@@ -317,13 +329,19 @@ impl<'w> Forecast<'w> {
         let plain = second(None)?;
         let mut through = [[0.0; LANES]; LANES];
         for lane in 0..LANES {
-            let raised = second(Some(lane))?;
+            let raised = second(Some((1, lane)))?;
             for (row, (a, b)) in raised.iter().zip(plain).enumerate() {
                 through[row][lane] = a - b;
             }
         }
+        let before = second(Some((0, 0)))?[0] - plain[0];
+        let kept = if before == 0.0 {
+            0.0
+        } else {
+            before / (before + through[0][0])
+        };
         let unchanged = (0..LANES)
             .all(|i| (0..LANES).all(|j| (through[i][j] - if i == j { 1.0 } else { 0.0 }).abs() < 1e-9));
-        Ok(if unchanged { None } else { Some(through) })
+        Ok((if unchanged { None } else { Some(through) }, kept))
     }
 }

@@ -73,8 +73,13 @@ impl Other<'_> {
         if matches!(stage, Stage::Sense | Stage::World) {
             let read = forecast.readings_beside(instant.sensed_from, &instant.covariance, &instant.look);
             for lane in (0..8).filter(|&lane| read[lane] != instant.uncut[lane]) {
-                shift[lane + 2] =
-                    cut(read[lane], instant.deviation[lane], step_counts).mean - instant.expected[lane];
+                shift[lane + 2] = cut(
+                    read[lane] + instant.remembered[lane],
+                    instant.deviation[lane],
+                    step_counts,
+                )
+                .mean
+                    - instant.expected[lane];
             }
         }
         if shift == [0.0; MEASURED] && off.iter().all(|d| d.abs() < NOTHING) {

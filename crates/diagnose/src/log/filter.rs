@@ -24,8 +24,10 @@ pub(crate) struct Instant {
     /// Pose and covariance at which the readings were expected.
     pub(crate) sensed_from: Pose,
     pub(crate) covariance: PoseMatrix,
-    /// Expected readings before and after the cut, and the standard deviation that they were cut with.
+    /// Expected readings before the cut, what the numbers measured before changed of them by the readings' memory, the readings
+    /// after the cut, and the standard deviation that they were cut with.
     pub(crate) uncut: [f64; 8],
+    pub(crate) remembered: [f64; 8],
     pub(crate) expected: [f64; 8],
     pub(crate) deviation: [f64; 8],
     pub(crate) look: Look,
@@ -58,6 +60,45 @@ struct State {
     covariance: PoseMatrix,
     /// What the numbers measured since the pose was last settled move it by: x and y, m, and heading, rad.
     moved: [f64; 3],
+    /// What readings remember, if they lag.
+    memory: Option<Memory>,
+}
+
+/// Changes of the eight readings with the pose: x and y, counts/m, and heading, counts/rad.
+type Slopes = [[f64; 3]; 8];
+
+/// The last readings as what follows of them depends on the pose: a pose that is off was off before too. As far as slip is small,
+/// that is all there is to know of them.
+#[derive(Debug, Clone, Copy, Default)]
+struct Memory {
+    slope: Slopes,
+    /// What is known better since they were expected, counts.
+    missed: [f64; 8],
+}
+
+impl Memory {
+    /// The next readings, which keep a share of the last ones, with their own slopes: these get what the memory adds.
+    fn follow(&mut self, kept: f64, slopes: &mut Slopes) {
+        for (next, last) in slopes.iter_mut().zip(&self.slope) {
+            (0..3).for_each(|axis| next[axis] += kept * last[axis]);
+        }
+        self.slope = *slopes;
+        self.missed.iter_mut().for_each(|missed| *missed *= kept);
+    }
+
+    /// After the pose was moved by what was measured.
+    fn learn(&mut self, by: [f64; 3]) {
+        for (missed, slope) in self.missed.iter_mut().zip(&self.slope) {
+            *missed += (0..3).map(|axis| slope[axis] * by[axis]).sum::<f64>();
+        }
+    }
+
+    /// With slopes in terms of the pose after a displacement that turns with the heading.
+    fn carry(&mut self, turned: Vec2) {
+        for slope in &mut self.slope {
+            slope[2] += slope[0] * turned.y - slope[1] * turned.x;
+        }
+    }
 }
 
 impl State {
@@ -66,6 +107,7 @@ impl State {
             pose,
             covariance,
             moved: [0.0; 3],
+            memory: None,
         }
     }
 
@@ -97,6 +139,9 @@ impl State {
     /// Moves the pose by what was measured.
     fn settle(&mut self) {
         self.shift(self.moved);
+        if let Some(memory) = &mut self.memory {
+            memory.learn(self.moved);
+        }
         self.moved = [0.0; 3];
     }
 
@@ -172,6 +217,7 @@ fn filtered(
     let mut covariance = [[0.0; 3]; 3];
     (covariance[0][0], covariance[1][1], covariance[2][2]) = (4e-6, 4e-6, 2.5e-3);
     let mut state = State::new(start, covariance);
+    state.memory = (forecast.kept() > 0.0).then(Memory::default);
     let mut log_likelihood = 0.0;
     for (i, row) in rows.iter().enumerate() {
         forecast.tick(row.time_s);
@@ -227,6 +273,7 @@ fn step(
         sensed_from: state.pose,
         covariance: state.covariance,
         uncut: [0.0; 8],
+        remembered: [0.0; 8],
         expected: [0.0; 8],
         deviation: [1.0; 8],
         look: Look::default(),
@@ -259,7 +306,13 @@ fn step(
         }
     }
     (instant.moved_to, instant.turned) = (motion.pose, motion.turned);
-    *state = State::new(motion.pose, covariance);
+    if let Some(memory) = &mut state.memory {
+        memory.carry(motion.turned);
+    }
+    *state = State {
+        memory: state.memory,
+        ..State::new(motion.pose, covariance)
+    };
     instant
 }
 
@@ -306,17 +359,22 @@ fn sense(
 ) {
     (instant.look, instant.uncut) = (outlook.look, outlook.mean);
     let noise = forecast.machine().noise;
-    for lane in 0..8 {
+    let mut slopes = outlook.slope;
+    if let Some(memory) = &mut state.memory {
+        memory.follow(forecast.kept(), &mut slopes);
+        instant.remembered = memory.missed;
+    }
+    for (lane, slope) in slopes.into_iter().enumerate() {
         let m = lane + 2;
-        let slope = outlook.slope[lane];
+        let mean = outlook.mean[lane] + instant.remembered[lane];
         let p = &state.covariance;
         // The variance before the cut holds the pose's share at this moment of the sequence.
         let pose_variance: f64 = (0..3)
             .map(|i| slope[i] * (p[i][0] * slope[0] + p[i][1] * slope[1] + p[i][2] * slope[2]))
             .sum();
-        let own_variance = noise.deviation(outlook.mean[lane]).powi(2) + outlook.edge_variance[lane];
+        let own_variance = noise.deviation(mean).powi(2) + outlook.edge_variance[lane];
         let deviation = (own_variance + pose_variance).sqrt();
-        let read = cut(outlook.mean[lane], deviation, step_counts);
+        let read = cut(mean, deviation, step_counts);
         (instant.expected[lane], instant.deviation[lane]) = (read.mean, deviation);
         if usable >> m & 1 == 0 {
             continue;

@@ -1,7 +1,7 @@
 use proptest::prelude::*;
 
-use super::super::testing::{active, declared, moment, silent, steps, with};
-use crate::{Pose, Readings};
+use super::super::testing::{active, declared, moment, scene, silent, steps, with};
+use crate::{Forecast, Model, Pose, Readings};
 
 const STEP_S: f64 = 0.064;
 const READINGS: Readings = [10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 70.0, 80.0];
@@ -85,6 +85,18 @@ fn lag_of_a_step_is_an_exponential() {
             readings[3]
         );
     }
+}
+
+#[test]
+fn readings_keep_of_the_last_ones_what_a_lag_does() {
+    let kept = |model: &Model| {
+        let world = scene().world(model, 0).unwrap();
+        Forecast::new(&world).unwrap().kept()
+    };
+    let mixed = with(&declared(), "crosstalk", &[0.2]);
+    assert_eq!(kept(&mixed), 0.0);
+    let lagging = with(&mixed, "sensor-lag", &[0.12]);
+    assert!((kept(&lagging) - (-STEP_S / 0.12).exp()).abs() < 1e-12);
 }
 
 #[test]
