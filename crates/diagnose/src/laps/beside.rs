@@ -85,13 +85,14 @@ impl Search<'_> {
     /// A base with each of the effects that explain best what it leaves, but for those that were tried and for those that
     /// jump: [`Search::scans_beside`] is for these.
     pub(super) fn beside(&self, base: &Base, left: &White, tried: &[Hypothesis]) -> Vec<Hypothesis> {
-        self.beside_of(self.screened_beside(base, left), base, left, tried)
+        let heard = self.heard_beside(base, self.screened_beside(base, left));
+        self.beside_of(&heard, base, left, tried)
     }
 
-    /// The same of what was screened already.
+    /// The same of what was screened and heard already.
     pub(super) fn beside_of(
         &self,
-        screened: Vec<Screened>,
+        heard: &[Screened],
         base: &Base,
         left: &White,
         tried: &[Hypothesis],
@@ -99,8 +100,7 @@ impl Search<'_> {
         const FURTHER: usize = 3;
         let gain = 0.5 * (self.residual.norm_squared() - left.norm_squared());
         let start = &base.hypothesis;
-        let heard = self.heard_beside(base, screened);
-        (self.shortlist(&heard).into_iter())
+        (self.shortlist(heard).into_iter())
             .map(|other| (other.score, start.with(&other.hypothesis)))
             // A pattern may cost more than all that a further effect gains.
             .filter(|(score, pair)| pair.worth(gain + score) > start.worth(gain))
@@ -122,7 +122,7 @@ impl Search<'_> {
 
     /// The best of what was screened beside a base, at the sizes and with the scores that simulations give them: paths were
     /// simulated without the base, and actions do not quite add up.
-    fn heard_beside(&self, base: &Base, screened: Vec<Screened>) -> Vec<Screened> {
+    pub(super) fn heard_beside(&self, base: &Base, screened: Vec<Screened>) -> Vec<Screened> {
         const HEARD: usize = 16;
         const OF_ONE_EFFECT: usize = 2;
         const SHARE: f64 = 0.4;

@@ -256,7 +256,13 @@ fn preferred(fewer: Vec<Found>, more: Vec<Found>) -> Vec<Found> {
     };
     let count = |f: &Found| f.explanation.effects.iter().map(|c| c.fitted).sum::<usize>();
     let (a, b) = (&first.explanation, &further.explanation);
-    let numbers = count(further).saturating_sub(count(first)).max(1) as f64;
+    let numbers = count(further).saturating_sub(count(first));
+    // Patterns have a price of their own, which tells where as many numbers were fitted.
+    let gained = if numbers == 0 {
+        b.score - a.score
+    } else {
+        b.gain - a.gain
+    };
     let better = fits(b) || b.share >= ALL_BUT || !suffices(a) && b.share > a.share;
     let worth = if suffices(a) { WORTH_BESIDE } else { WORTH };
     let faults = if fits(b) && !suffices(a) {
@@ -264,7 +270,7 @@ fn preferred(fewer: Vec<Found>, more: Vec<Found>) -> Vec<Found> {
     } else {
         FAULTS * a.gain
     };
-    let wins = b.gain - a.gain > faults.max(worth * numbers) && better && !heaps_noise(b);
+    let wins = gained > faults.max(worth * numbers.max(1) as f64) && better && !heaps_noise(b);
     with_first(wins, more, fewer)
 }
 

@@ -249,7 +249,11 @@ impl Search<'_> {
         if screened.first().is_none_or(|best| best.score < enough) {
             return Vec::new();
         }
-        let starts = self.beside_of(screened, &base, &single.left, &[]);
+        let heard = self.heard_beside(&base, screened);
+        if heard.first().is_none_or(|best| best.score < PROMISING) {
+            return Vec::new();
+        }
+        let starts = self.beside_of(&heard, &base, &single.left, &[]);
         self.pairs_from(&starts, &ROUNDS_BESIDE, single.explanation.score)
     }
 
@@ -437,7 +441,7 @@ impl Search<'_> {
     }
 
     /// Descents with better sizes of the effects that jump, which were found beside others that have moved since: those of
-    /// the best descent, for all, until they come to rest.
+    /// the best descent, for all, until they come to rest; and those of rivals, for themselves.
     fn hunted_again(&self, mut descents: Vec<Descent>) -> Vec<Descent> {
         const MOST: usize = 3;
         let held = |part: &Part| part.held.is_some();
@@ -460,6 +464,32 @@ impl Search<'_> {
                 .collect();
             if rest {
                 break;
+            }
+        }
+        self.with_rivals_hunted(descents)
+    }
+
+    /// Descents of which those that are near the best have better sizes of their own of the effects that jump.
+    fn with_rivals_hunted(&self, mut descents: Vec<Descent>) -> Vec<Descent> {
+        const NEAR: f64 = 50.0;
+        const MOST: usize = 2;
+        descents.sort_by(|a, b| b.score.total_cmp(&a.score));
+        let best = descents.first().map_or(0.0, |best| best.score);
+        let is_rival = |descent: &Descent| {
+            let parts = &descent.hypothesis.parts;
+            best - descent.score < NEAR && parts.len() > 1 && parts.iter().any(|part| part.held.is_some())
+        };
+        let hunted = |rival: &Descent| {
+            let hunted = self
+                .atlas
+                .hunt_again(self.simulate, self.data, &rival.hypothesis)?;
+            let start = Descent::start(self.atlas, &hunted);
+            self.atlas.descend(self.simulate, self.data, start, Round::Full)
+        };
+        let rivals = descents.iter_mut().skip(1).filter(|rival| is_rival(rival));
+        for rival in rivals.take(MOST) {
+            if let Some(hunted) = hunted(rival).filter(|hunted| hunted.score > rival.score) {
+                *rival = hunted;
             }
         }
         descents
