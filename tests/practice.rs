@@ -114,8 +114,13 @@ fn two_effects_at_once_are_both_seen() {
     let parameters = effects[shift]["parameters"].as_array().unwrap();
     let dx = parameters.iter().find(|p| p["name"] == "dx_m").unwrap();
     assert!((dx["value"].as_f64().unwrap() - 0.001_04).abs() < 2.5e-4, "{dx}");
-    let gain = effects[1 - shift]["name"].as_str().unwrap();
-    assert!(GAINS.contains(&gain), "{trace:#}");
+    // These laps do not tell a gain from another axle: either comes first, by less than chance, with the other beside it.
+    let second = &effects[1 - shift];
+    let name = second["name"].as_str().unwrap();
+    assert!(name == "axle-length" || GAINS.contains(&name), "{trace:#}");
+    let mut said = second["alternatives"].as_array().unwrap().clone();
+    said.push(second["name"].clone());
+    assert!(said.contains(&"reading-gain".into()), "{trace:#}");
     helps(&trace);
 }
 

@@ -259,8 +259,10 @@ impl Search<'_> {
 
     fn pairs_from(&self, starts: &[Hypothesis], rounds: &Rounds, reached: f64) -> Vec<Found> {
         let mut descents = self.descend_several(starts, rounds, reached);
-        // What leaves far too much lacks a third effect rather than another second one.
-        if let Some(best) = best_of(&descents).filter(|best| !best.leaves_far_too_much()) {
+        // What leaves far too much lacks a third effect rather than another second one, and what is no better than fewer effects
+        // lacks none.
+        let worth_more = |best: &&Descent| best.score > reached && !best.leaves_far_too_much();
+        if let Some(best) = best_of(&descents).filter(worth_more) {
             let exchanged = self.exchanged(best, starts);
             descents.extend(self.descend_several(&exchanged, rounds, best.score));
         }
