@@ -9,6 +9,7 @@ use sim::Setting;
 use super::atlas::{Atlas, Simulate, White};
 use super::expectation::Expectation;
 use super::hypothesis::{Freedom, Hypothesis, Part};
+use super::parabola::groups;
 use super::refine::Descent;
 use super::screen::{Screened, without_directions};
 use super::search::Search;
@@ -48,17 +49,21 @@ impl Atlas {
     /// What the numbers of a hypothesis do, as orthonormal directions.
     pub(super) fn directions(&self, simulate: &Simulate<'_>, hypothesis: &Hypothesis) -> Vec<White> {
         const SETS: u64 = 4;
-        let action = |freedom: &Freedom| {
-            let at = |by: f64| {
-                let moved = hypothesis.moved(self, &[(*freedom, by)]);
+        let mut directions: Vec<White> = Vec::new();
+        for group in groups(&hypothesis.freedoms(self)) {
+            let at = |sign: f64| {
+                let moves: Vec<(Freedom, f64)> = group.iter().map(|f| (*f, sign * f.step)).collect();
+                let moved = hypothesis.moved(self, &moves);
                 self.simulated_plainly(simulate, &moved.settings(self), 0..SETS)
             };
-            Some(self.white(&at(freedom.step)?, &at(-freedom.step)?))
-        };
-        let mut directions: Vec<White> = Vec::new();
-        for action in hypothesis.freedoms(self).iter().filter_map(action) {
-            let new = without_directions(action, &directions);
-            directions.extend(new.try_normalize(f64::MIN_POSITIVE));
+            let (Some(up), Some(down)) = (at(1.0), at(-1.0)) else {
+                continue;
+            };
+            let action = self.white(&up, &down);
+            for freedom in &group {
+                let own = freedom.own_share(&action, &self.layout);
+                directions.extend(without_directions(own, &directions).try_normalize(f64::MIN_POSITIVE));
+            }
         }
         directions
     }

@@ -35,8 +35,8 @@ const WORTH_BESIDE: f64 = 15.0;
 /// exact.
 const FAULTS: f64 = 0.001;
 
-/// Explanations of several effects beside which a further one is sought: the best need not be part of the best with one more.
-const FURTHER_FROM: usize = 2;
+/// Single effects of which the sizes are let go over the runs or in time.
+const PATTERNS_OF: usize = 3;
 
 /// Whether what an explanation leaves is as likely as that by chance.
 fn leaves_more_likely_than(explanation: &Explanation, p: f64) -> bool {
@@ -164,7 +164,7 @@ fn explain(search: &Search<'_>, screened: &[Screened]) -> Vec<Found> {
         sort(&mut found);
     }
     if !first_is(&found, fits) {
-        found.extend(search.patterns(&found));
+        found.extend(search.patterns(&found[..found.len().min(PATTERNS_OF)]));
         sort(&mut found);
     }
     let leaves_next_to_nothing = |best: &Explanation| best.share >= ENOUGH && !goes_over_runs_or_time(best);
@@ -174,6 +174,10 @@ fn explain(search: &Search<'_>, screened: &[Screened]) -> Vec<Found> {
         _ => search.pairs(&found),
     };
     found = preferred(found, pairs);
+    if first_is(&found, |best| best.effects.len() > 1 && !suffices(best)) {
+        let patterns = search.patterns(&found[..1]);
+        found = preferred(found, patterns);
+    }
     if !first_is(&found, |best| suffices(best) || best.share > MOST) {
         let beside = search.scans_beside(&found);
         found = preferred(found, beside);
@@ -185,7 +189,7 @@ fn explain(search: &Search<'_>, screened: &[Screened]) -> Vec<Found> {
         let alike = found
             .iter()
             .filter(|other| other.explanation.effects.len() == as_many);
-        let further = search.further(alike.take(FURTHER_FROM));
+        let further = search.further(alike);
         found = preferred(found, further);
     }
     // No cause without a name explains what several with theirs explain nearly all of.

@@ -324,12 +324,19 @@ impl Hypothesis {
         self.parts.iter().all(|part| part.shape == Shape::Constant)
     }
 
-    /// A single constant effect with a size that goes over the runs or in time, from the same size; `None` for others.
-    pub(super) fn over(&self, shape: Shape, atlas: &Atlas) -> Option<Self> {
-        let [part] = self.parts.as_slice() else {
-            return None;
-        };
-        part.over(shape, atlas).map(Self::of)
+    /// Constant effects with the size of one of them, of each, going over the runs or in time, from the same size; none of
+    /// effects that have patterns.
+    pub(super) fn over(&self, shape: Shape, atlas: &Atlas) -> Vec<Self> {
+        if !self.is_constant() {
+            return Vec::new();
+        }
+        (0..self.parts.len())
+            .filter_map(|part| {
+                let mut parts = self.parts.clone();
+                parts[part] = parts[part].over(shape, atlas)?;
+                Some(Self { parts })
+            })
+            .collect()
     }
 
     /// The same with the pattern of its only effect that has one given to each of the others instead.
@@ -345,6 +352,22 @@ impl Hypothesis {
             Some(Self { parts })
         };
         self.parts.iter().enumerate().filter_map(given).collect()
+    }
+
+    /// Where several of its effects have patterns, the same with one of these at its mean size, for each.
+    pub(super) fn with_a_pattern_less(&self, atlas: &Atlas) -> Vec<Self> {
+        let patterned: Vec<usize> = (0..self.parts.len())
+            .filter(|&part| self.parts[part].shape != Shape::Constant)
+            .collect();
+        if patterned.len() < 2 {
+            return Vec::new();
+        }
+        let without = |part: usize| {
+            let mut parts = self.parts.clone();
+            parts[part] = parts[part].plain(atlas);
+            Self { parts }
+        };
+        patterned.into_iter().map(without).collect()
     }
 
     /// The same with the mean size of every effect whose size goes over the runs or in time; `None` if none does.

@@ -10,8 +10,8 @@ use super::simulated::Evaluated;
 
 /// Log-likelihood by which the ends of a step may differ from its middle for a parabola through the three to tell more than one
 /// through means, and that by which it is clear with few data sets that they differ by more.
-const FAR: f64 = 50.0;
-const VERY_FAR: f64 = 100.0;
+const FAR: f64 = 200.0;
+const VERY_FAR: f64 = 400.0;
 
 /// Where a parabola through the log-likelihoods of a hypothesis and of a step to either side is highest.
 pub(super) struct Likeliest {

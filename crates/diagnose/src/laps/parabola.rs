@@ -51,12 +51,8 @@ impl Atlas {
             for (group, (down_by, down), (up_by, up)) in &sides {
                 let (down, up) = (action(down), action(up));
                 for (i, freedom) in group.iter().enumerate() {
-                    let mask = |w: &White| {
-                        freedom
-                            .run()
-                            .map_or_else(|| w.clone(), |run| of_run(w, run, &self.layout))
-                    };
-                    columns.push(Column::through((down_by[i], mask(&down)), (up_by[i], mask(&up))));
+                    let own = |action: &White| freedom.own_share(action, &self.layout);
+                    columns.push(Column::through((down_by[i], own(&down)), (up_by[i], own(&up))));
                 }
             }
             columns
@@ -82,7 +78,7 @@ impl Atlas {
 }
 
 /// Freedoms that are moved together: the sizes of one part in its runs.
-fn groups(freedoms: &[Freedom]) -> Vec<Vec<Freedom>> {
+pub(super) fn groups(freedoms: &[Freedom]) -> Vec<Vec<Freedom>> {
     let mut groups: Vec<Vec<Freedom>> = Vec::new();
     for freedom in freedoms {
         match groups.last_mut() {
@@ -91,6 +87,14 @@ fn groups(freedoms: &[Freedom]) -> Vec<Vec<Freedom>> {
         }
     }
     groups
+}
+
+impl Freedom {
+    /// Its own share of the action of its group.
+    pub(super) fn own_share(&self, action: &White, layout: &Layout) -> White {
+        self.run()
+            .map_or_else(|| action.clone(), |run| of_run(action, run, layout))
+    }
 }
 
 /// What one run's size does: that run's mean, and its share of its recording's trend and second-order numbers.

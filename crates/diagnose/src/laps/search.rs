@@ -1,6 +1,8 @@
 //! The search for explanations of one data set: single effects, sizes that must be scanned, effects together, and causes
 //! without a name.
 
+use std::collections::BTreeSet;
+
 use rayon::prelude::*;
 
 use super::atlas::{Atlas, Simulate, White};
@@ -72,6 +74,9 @@ const ROUNDS_BESIDE: [(Round, f64, f64); 6] = [
 
 /// The same for hypotheses of many numbers that are linear in what they do.
 const ROUNDS_OF_GROUPS: [(Round, f64, f64); 2] = [(Round::Rough, 30.0, 0.05), (Round::Full, 20.0, 0.015)];
+
+/// Explanations beside which a further effect is sought: the best need not be part of the best with one more.
+const BASES: usize = 2;
 
 /// Errors of a difference in log-likelihood that may be chance.
 const ERRORS: f64 = 2.0;
@@ -171,7 +176,6 @@ impl Search<'_> {
 
     /// Effects whose action jumps with their size beside the best single effects and beside either of the best pair's.
     pub(super) fn scans_beside(&self, found: &[Found]) -> Vec<Found> {
-        const BASES: usize = 2;
         const CLOSER: usize = 2;
         let mut bases: Vec<Hypothesis> = Vec::new();
         for part in found.iter().flat_map(|found| &found.hypothesis.parts) {
@@ -204,11 +208,10 @@ impl Search<'_> {
         (0..self.atlas.probes.len()).filter(|&probe| self.atlas.probes[probe].jumps)
     }
 
-    /// The best single effects with sizes that go over the runs or in time, where what they leave does, tried to the end.
-    pub(super) fn patterns(&self, singles: &[Found]) -> Vec<Found> {
-        const STARTS: usize = 3;
+    /// The best explanations with a size that goes over the runs or in time, where what they leave does, tried to the end.
+    pub(super) fn patterns(&self, best: &[Found]) -> Vec<Found> {
         let mut starts: Vec<Hypothesis> = Vec::new();
-        for found in singles.iter().take(STARTS) {
+        for found in best {
             let Some(left) = found.explanation.remainder else {
                 continue;
             };
@@ -227,7 +230,7 @@ impl Search<'_> {
         const PAIRS: usize = 5;
         let screened = self.atlas.screen_pairs(self.residual, PAIRS);
         let mut starts: Vec<Hypothesis> = screened.into_iter().map(|pair| pair.hypothesis).collect();
-        for single in singles.iter().take(2) {
+        for single in of_other_effects(singles.iter()).into_iter().take(BASES) {
             let base = self.atlas.base(self.simulate, single.hypothesis.clone());
             let further = self.beside(&base, &single.left, &starts);
             starts.extend(further);
@@ -270,9 +273,9 @@ impl Search<'_> {
     }
 
     /// Explanations with what explains best what they leave beside them, tried to the end.
-    pub(super) fn further<'f>(&self, bases: impl Iterator<Item = &'f Found>) -> Vec<Found> {
+    pub(super) fn further<'f>(&self, best: impl Iterator<Item = &'f Found>) -> Vec<Found> {
         let mut starts: Vec<Hypothesis> = Vec::new();
-        for base in bases {
+        for base in of_other_effects(best).into_iter().take(BASES) {
             let left = &base.left;
             let base = self.atlas.base(self.simulate, base.hypothesis.clone());
             let further = self.beside(&base, left, &starts);
@@ -281,14 +284,15 @@ impl Search<'_> {
         self.settle(self.descend_several(&starts, &ROUNDS_OF_SEVERAL, f64::NEG_INFINITY))
     }
 
-    /// Descends from hypotheses of several effects; the best one is tried without its patterns too, and with its pattern given
-    /// to another of its effects: what another effect left may have suggested it.
+    /// Descends from hypotheses of several effects; the best one is tried without its patterns too, one of them or all, and with
+    /// its pattern given to another of its effects: what another effect left may have suggested it.
     fn descend_several(&self, starts: &[Hypothesis], rounds: &Rounds, reached: f64) -> Vec<Descent> {
         let mut descents = self.descend(starts.iter(), rounds, reached);
         let best = best_of(&descents);
         let others: Vec<Hypothesis> = best.map_or_else(Vec::new, |best| {
             let plain = best.hypothesis.without_patterns(self.atlas).into_iter();
             plain
+                .chain(best.hypothesis.with_a_pattern_less(self.atlas))
                 .chain(best.hypothesis.with_pattern_elsewhere(self.atlas))
                 .collect()
         });
@@ -591,6 +595,17 @@ fn may_catch_up(descent: &Descent, best: f64) -> bool {
 /// The descent with the best score.
 fn best_of(descents: &[Descent]) -> Option<&Descent> {
     descents.iter().max_by(|a, b| a.score.total_cmp(&b.score))
+}
+
+/// Of explanations those that do not have the effects of an earlier one, whatever their patterns.
+fn of_other_effects<'f>(found: impl Iterator<Item = &'f Found>) -> Vec<&'f Found> {
+    let mut known: BTreeSet<Vec<&str>> = BTreeSet::new();
+    let is_new = |found: &&Found| {
+        let mut names = found.explanation.names();
+        names.sort_unstable();
+        known.insert(names)
+    };
+    found.filter(is_new).collect()
 }
 
 /// Best first.
