@@ -12,7 +12,7 @@ use super::hypothesis::{Freedom, Hypothesis, Part};
 use super::parabola::groups;
 use super::refine::Descent;
 use super::screen::{Screened, without_directions};
-use super::search::Search;
+use super::search::{Search, WEAK};
 
 /// A hypothesis beside which another effect is sought.
 #[derive(Debug, Clone)]
@@ -103,7 +103,10 @@ impl Search<'_> {
         tried: &[Hypothesis],
     ) -> Vec<Hypothesis> {
         const FURTHER: usize = 3;
+        /// The same of a weak signal, of which what was heard tells less.
+        const FURTHER_OF_WEAK: usize = 5;
         let gain = 0.5 * (self.residual.norm_squared() - left.norm_squared());
+        let further = if gain < WEAK { FURTHER_OF_WEAK } else { FURTHER };
         let start = &base.hypothesis;
         (self.shortlist(heard).into_iter())
             .map(|other| (other.score, start.with(&other.hypothesis)))
@@ -111,7 +114,7 @@ impl Search<'_> {
             .filter(|(score, pair)| pair.worth(gain + score) > start.worth(gain))
             .map(|(_, pair)| pair)
             .filter(|pair| !tried.iter().any(|other| other.probes() == pair.probes()))
-            .take(FURTHER)
+            .take(further)
             .collect()
     }
 

@@ -78,6 +78,9 @@ const ROUNDS_OF_GROUPS: [(Round, f64, f64); 2] = [(Round::Rough, 30.0, 0.05), (R
 /// Explanations beside which a further effect is sought: the best need not be part of the best with one more.
 const BASES: usize = 2;
 
+/// Log-likelihood up to which a signal is weak.
+pub(super) const WEAK: f64 = 400.0;
+
 /// Errors of a difference in log-likelihood that may be chance.
 const ERRORS: f64 = 2.0;
 
@@ -113,8 +116,6 @@ impl Search<'_> {
     /// Of a weak signal the effects beside a shortlist that are likeliest at the sizes that a screening found: by the noise of its
     /// paths it tells little of them, and nothing of what they do to the scatter.
     fn auditioned<'s>(&self, screened: &'s [Screened], listed: &[&'s Screened]) -> Vec<&'s Screened> {
-        /// Score up to which a signal is weak.
-        const WEAK: f64 = 400.0;
         const HEARD: usize = 20;
         const SHARE: f64 = 0.5;
         const SETS: u64 = 8;
