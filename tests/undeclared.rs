@@ -1,7 +1,8 @@
 //! Effects that the program does not know, written here: it sees nothing of them but files.
 
-use sim::{Effect, Machine, Moment, Param, Readings, Setting, Spec, Stage, Vec2, WheelSpeeds};
+use sim::{Effect, Machine, Moment, Param, Pattern, Readings, Setting, Spec, Stage, Vec2, WheelSpeeds};
 
+use crate::ground;
 use crate::support::Scratch;
 use crate::tracing::{GAINS, Robot, holds, names, never_a_listed_name, says, share_signatures, trace};
 
@@ -191,6 +192,39 @@ fn a_rounding_of_readings_is_found_beside_a_gain_that_hides_its_size() {
     assert!(gain == "axle-length" || GAINS.contains(&gain), "{gain}");
     let counts = found["effects"][step]["parameters"][0]["value"].as_f64().unwrap();
     assert!((counts / COUNTS - 1.0).abs() < 0.01, "{counts}");
+}
+
+#[test]
+fn a_light_that_goes_over_the_runs_is_seen_beside_wheels_that_slip_much() {
+    const SLIP: f64 = 4.2;
+    const COUNTS: [f64; 4] = [43.7, 17.3, 11.4, 6.9];
+    const AZIMUTH_RAD: f64 = 2.126;
+    share_signatures("rule-based");
+    let scratch = Scratch::new();
+    let mut robot = Robot::with(Setting::constant(sim::find("slip-level").unwrap(), [SLIP]));
+    robot.controller = ground::rule_based();
+    robot.effects.push(Setting {
+        spec: sim::find("directional-light").unwrap(),
+        pattern: Pattern::ByRun(COUNTS.map(|counts| vec![counts, AZIMUTH_RAD]).to_vec()),
+    });
+    robot.record(&scratch, "set");
+    let found = trace(&scratch, "rule-based", "set", &[]);
+    assert_eq!(found["verdict"], "explained", "{found:#}");
+    let effects = found["effects"].as_array().unwrap();
+    let of = |name: &str| effects.iter().find(|effect| effect["name"] == name);
+    let light = of("directional-light").unwrap_or_else(|| panic!("{found:#}"));
+    let slip = of("slip-level").or_else(|| of("slip-memory"));
+    assert!(effects.len() == 2 && slip.is_some(), "{found:#}");
+    assert!(light["by"] == "run" && slip.unwrap()["by"].is_null(), "{found:#}");
+    let counts = light["parameters"].as_array().unwrap().iter();
+    let counts = counts
+        .clone()
+        .find(|parameter| parameter["name"] == "counts")
+        .unwrap();
+    for (run, truth) in COUNTS.iter().enumerate() {
+        let said = counts["value"][run].as_f64().unwrap();
+        assert!((said - truth).abs() < 12.0, "{counts}");
+    }
 }
 
 #[test]

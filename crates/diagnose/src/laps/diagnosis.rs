@@ -20,8 +20,11 @@ const SURELY_P: f64 = 1e-6;
 const ENOUGH: f64 = 0.98;
 /// The same for several effects, which have more freedom to be wrong.
 const ALL_BUT: f64 = 0.995;
-/// Share that several effects, or one without a name, must explain to be claimed in part.
+/// Share that several effects of a strong signal, or one without a name, must explain to be claimed in part.
 const MOST: f64 = 0.9;
+/// Score above which a signal is strong: the right names leave nothing significant of another, and what is left by up to three tells of
+/// a cause that has none.
+const STRONG: f64 = 2000.0;
 /// Share up to which an explanation does not stand that leaves what is not likely, be it not significant: of weak signals chance
 /// alone explains as much.
 const TOO_LITTLE: f64 = 0.7;
@@ -163,10 +166,8 @@ fn explain(search: &Search<'_>, screened: &[Screened]) -> Vec<Found> {
         found.extend(scans);
         sort(&mut found);
     }
-    if !first_is(&found, fits) {
-        found.extend(search.patterns(&found[..found.len().min(PATTERNS_OF)]));
-        sort(&mut found);
-    }
+    found.extend(search.patterns(&found[..found.len().min(PATTERNS_OF)]));
+    sort(&mut found);
     let leaves_next_to_nothing = |best: &Explanation| best.share >= ENOUGH && !goes_over_runs_or_time(best);
     let pairs = match found.first() {
         Some(best) if stands_alone(&best.explanation) => search.pairs_with(best, true),
@@ -229,7 +230,8 @@ fn verdict_of(best: &Explanation) -> Verdict {
             Verdict::Explained
         };
     }
-    let enough = if best.has_no_name() || best.effects.len() > 1 {
+    let several = best.effects.len() > 1 && best.score > STRONG;
+    let enough = if best.has_no_name() || several {
         MOST
     } else {
         ENOUGH

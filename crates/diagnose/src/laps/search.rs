@@ -2,6 +2,7 @@
 //! without a name.
 
 use std::collections::BTreeSet;
+use std::ops::Range;
 
 use rayon::prelude::*;
 
@@ -13,7 +14,7 @@ use super::hypothesis::{Freedom, Hypothesis, Part, Shape};
 use super::refine::{CLOSE_SETS, Descent, Round, Settled};
 use super::screen::Screened;
 use super::simulated::FINAL_SETS;
-use super::tests_of_fit::{FourNumbers, HOPELESS_P, SIGNIFICANT_P};
+use super::tests_of_fit::{FourNumbers, HOPELESS_P, Quadratic, SIGNIFICANT_P};
 use crate::{Candidate, Explanation};
 
 /// An explanation and what simulates it.
@@ -27,6 +28,8 @@ pub(super) struct Found {
     pub(super) gain_error: f64,
     /// What it leaves of the data, in units of the declared model's scatter.
     left: White,
+    /// The same in units of its own scatter and of the simulation's error.
+    residual: White,
 }
 
 /// A search for explanations of one data set.
@@ -209,20 +212,46 @@ impl Search<'_> {
         (0..self.atlas.probes.len()).filter(|&probe| self.atlas.probes[probe].jumps)
     }
 
-    /// The best explanations with a size that goes over the runs or in time, where what they leave does, tried to the end.
+    /// The best explanations with a size that goes over the runs or in time, where what they leave does, all in all or along
+    /// what a single effect does, tried to the end.
     pub(super) fn patterns(&self, best: &[Found]) -> Vec<Found> {
         let mut starts: Vec<Hypothesis> = Vec::new();
         for found in best {
             let Some(left) = found.explanation.remainder else {
                 continue;
             };
-            for (shape, left) in [(Shape::ByRun, left.runs), (Shape::ByTime, left.trend)] {
-                if left.p < SIGNIFICANT_P {
+            let [runs, trend] = self.along_its_action(found);
+            for (shape, left) in [
+                (Shape::ByRun, [left.runs, runs]),
+                (Shape::ByTime, [left.trend, trend]),
+            ] {
+                if left.iter().any(|left| left.p < SIGNIFICANT_P) {
                     starts.extend(found.hypothesis.over(shape, self.atlas));
                 }
             }
         }
         self.try_rounds(starts.iter(), &ROUNDS_OF_SEVERAL)
+    }
+
+    /// What an explanation leaves from run to run, and of a trend, along what it does to the mean lap: one number a run, which
+    /// shows what is lost among all the numbers of a lap.
+    fn along_its_action(&self, found: &Found) -> [Quadratic; 2] {
+        let layout = &self.atlas.layout;
+        let action = self.residual - &found.left;
+        let mut along = White::zeros(layout.lap);
+        for run in (0..layout.runs()).map(|run| layout.run(run)) {
+            along += action.rows(run.start, run.len());
+        }
+        let along = along.normalize();
+        let size = |range: Range<usize>| along.dot(&found.residual.rows(range.start, range.len()));
+        let sizes: Vec<f64> = (0..layout.runs()).map(|run| size(layout.run(run))).collect();
+        let trends = (0..layout.laps.len()).map(|recording| size(layout.trend(recording)).powi(2));
+        let mean = sizes.iter().sum::<f64>() / sizes.len() as f64;
+        let squares = sizes.iter().map(|size| (size - mean).powi(2));
+        [
+            Quadratic::new(squares.sum(), sizes.len() - 1),
+            Quadratic::new(trends.sum(), layout.laps.len()),
+        ]
     }
 
     /// The best pairs, tried to the end: those that together explain most as far as actions add up, and the best single
@@ -538,6 +567,7 @@ impl Search<'_> {
         Found {
             gain_error: refined.fit.gain_error,
             left: atlas.white(self.data, &evaluated.expectation),
+            residual: refined.fit.residual.clone(),
             hypothesis: refined.hypothesis.clone(),
             errors: refined.errors.clone(),
             explanation: Explanation {
