@@ -74,12 +74,12 @@ const CLASSES: &[Class] = &[
 
 /// Whether two names are one answer to the data of a set.
 pub(crate) fn alike(label: &Label, a: &str, b: &str) -> bool {
-    let applies = |class: &&Class| {
-        class.level == label.level
-            && class
-                .controller
-                .is_none_or(|controller| controller == label.controller)
-    };
+    are_one(label.level, label.controller, a, b)
+}
+
+/// Whether two names are one answer to such data of a robot with that controller.
+pub(crate) fn are_one(level: Level, controller: Controller, a: &str, b: &str) -> bool {
+    let applies = |class: &&Class| class.level == level && class.controller.is_none_or(|of| of == controller);
     a == b
         || CLASSES
             .iter()

@@ -10,6 +10,7 @@ use serde_json::Value as Json;
 use sim::{Stream, Streams};
 use toml::{Table, Value};
 
+use crate::classes::are_one;
 use crate::labels::{self, Controller, Kind, Label, Level, Set, Truth};
 use crate::program::Lapwing;
 use crate::recipes::{BY_RUN, RECIPES, Recipe};
@@ -122,9 +123,12 @@ impl Deck {
     fn next(&mut self, controller: Controller, others: &[Recipe]) -> Recipe {
         // The rule-based controller never commands so slowly.
         let acts = |recipe: &Recipe| controller == Controller::Braitenberg || recipe.name != "dead-band";
-        // As in the practice sets, two effects are in two stages.
+        // As in the practice sets, two effects are in two stages, and are seen by the camera alone: it must know them for two.
         let stage = |recipe: &Recipe| sim::find(recipe.name).map(|spec| spec.stage).ok();
-        let other = |recipe: &Recipe| others.iter().all(|other| stage(other) != stage(recipe));
+        let one = |a: &Recipe, b: &Recipe| are_one(Level::L1, controller, a.name, b.name);
+        let other = |recipe: &Recipe| {
+            (others.iter()).all(|other| stage(other) != stage(recipe) && !one(other, recipe))
+        };
         loop {
             if let Some(at) = self
                 .cards
@@ -291,5 +295,17 @@ mod tests {
         let mut all: Vec<&str> = RECIPES.iter().map(|recipe| recipe.name).collect();
         all.sort_unstable();
         assert_eq!(names, all);
+    }
+
+    #[test]
+    fn pairs_are_two_effects_to_the_data() {
+        for seed in 0..20 {
+            let mut deck = Deck::new(seed);
+            for plan in plans(200).into_iter().filter(|plan| plan.kind == Kind::Pair) {
+                let pair = deck.take(plan);
+                let [a, b] = [pair[0].name, pair[1].name];
+                assert!(!are_one(plan.level, plan.controller, a, b), "{a} + {b}");
+            }
+        }
     }
 }

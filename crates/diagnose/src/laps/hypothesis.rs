@@ -231,6 +231,12 @@ impl Part {
         }
     }
 
+    /// How many numbers of it were fitted, one way or another: one that all runs share is one.
+    pub(super) fn fitted(&self, part: usize, errors: &[(Freedom, f64)]) -> usize {
+        let own = errors.iter().filter(|(freedom, _)| freedom.part == part);
+        own.count() + self.held.iter().len()
+    }
+
     /// Standard errors in the order of the pattern's values: run after run, or start values and then slopes.
     pub(super) fn errors(&self, part: usize, errors: &[(Freedom, f64)], atlas: &Atlas) -> Vec<f64> {
         let count = self.values[0].len();

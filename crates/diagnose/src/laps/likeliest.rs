@@ -141,6 +141,6 @@ mod tests {
             assert!(found.place == place && !found.between, "{}", found.place);
         }
         // The points are so far apart that means tell more.
-        assert!(top((-1.0, -80.0), (1.0, -90.0)).is_none());
+        assert!(top((-1.0, -1.1 * FAR), (1.0, -1.2 * FAR)).is_none());
     }
 }

@@ -593,12 +593,11 @@ pub(super) fn candidates(
     let settings = hypothesis.settings(atlas);
     let mut effects: Vec<(f64, Candidate)> = (settings.into_iter().enumerate())
         .map(|(part, setting)| {
-            let standard_errors = hypothesis.parts[part].errors(part, errors, atlas);
             let candidate = Candidate {
                 setting,
                 gain,
-                fitted: standard_errors.iter().filter(|e| **e > 0.0).count(),
-                standard_errors,
+                fitted: hypothesis.parts[part].fitted(part, errors),
+                standard_errors: hypothesis.parts[part].errors(part, errors, atlas),
             };
             (hypothesis.weight(part, atlas), candidate)
         })
