@@ -326,7 +326,8 @@ fn atlas(session: &Session, recording: &Recording, purpose: Purpose, cache: &Cac
     let shape = recording.shape();
     let alike = recording.runs_are_alike();
     let mut key = format!(
-        "{purpose:?}\n{}\n{world}\n{shape:?}\n{}",
+        "{}\n{purpose:?}\n{}\n{world}\n{shape:?}\n{}",
+        Atlas::RECIPE,
         config.to_toml(),
         session.seed()
     );

@@ -64,6 +64,10 @@ impl Clone for Spent {
 }
 
 impl Atlas {
+    /// Changes whenever the numbers of an atlas of the same model mean something else: atlases of another recipe are not to be
+    /// read.
+    pub const RECIPE: u32 = 2;
+
     /// Simulates everything for one recording; `cuts` simulate the declared model with walls that another program may have
     /// cut, which is no departure from it; `alike` says whether the declared model does the same in every run. `tick` is called
     /// after each simulated data set.
@@ -364,6 +368,29 @@ pub(super) fn white(scatter: &[Scatter], layout: &Layout, to: &Expectation, from
         parts.push(scatter.whiten_second(&(&to.second - &from.second)));
     }
     DVector::from_iterator(layout.len(), parts.iter().flat_map(|p| p.iter().copied()))
+}
+
+/// A difference in units of another scatter.
+pub(super) fn in_other_units(white: &White, layout: &Layout, from: &[Scatter], to: &[Scatter]) -> White {
+    let mut other = white.clone();
+    let mut runs = 0;
+    for (g, laps) in layout.laps.iter().enumerate() {
+        let (from, to) = (&from[g], &to[g]);
+        for run in (runs..runs + laps.len()).map(|run| layout.run(run)) {
+            let part = white.rows(run.start, run.len()).into_owned();
+            let mut own = other.rows_mut(run.start, run.len());
+            own.copy_from(&to.whiten_mean(&from.unwhiten_mean(&part)));
+        }
+        runs += laps.len();
+        let (trend, second) = (layout.trend(g), layout.second(g));
+        let part = white.rows(trend.start, trend.len()).into_owned();
+        let mut own = other.rows_mut(trend.start, trend.len());
+        own.copy_from(&to.whiten(&from.unwhiten(&part)));
+        let part = white.rows(second.start, second.len()).into_owned();
+        let mut own = other.rows_mut(second.start, second.len());
+        own.copy_from(&to.whiten_second(&from.unwhiten_second(&part)));
+    }
+    other
 }
 
 /// What one data set says, in the form of an expectation: its runs are not pooled.

@@ -6,8 +6,8 @@ use std::ops::Range;
 use rayon::prelude::*;
 use sim::Setting;
 
-use super::atlas::{Atlas, Simulate, White};
-use super::expectation::Expectation;
+use super::atlas::{Atlas, Simulate, White, in_other_units, white};
+use super::expectation::{Expectation, Scatter};
 use super::hypothesis::{Freedom, Hypothesis, Part};
 use super::parabola::groups;
 use super::refine::Descent;
@@ -18,36 +18,49 @@ use super::search::{Search, WEAK};
 #[derive(Debug, Clone)]
 pub(super) struct Base {
     pub(super) hypothesis: Hypothesis,
-    /// What its numbers do, as orthonormal directions: they follow the other effect. None if they stay.
+    /// How its recordings scatter: what is sought has to stand out from that.
+    scatter: Vec<Scatter>,
+    /// What its numbers do, as orthonormal directions in units of its scatter: they follow the other effect. None if they stay.
     following: Vec<White>,
 }
 
 impl Base {
-    /// One whose numbers stay as they are.
-    pub(super) fn at_rest(hypothesis: Hypothesis) -> Self {
-        Self {
-            hypothesis,
-            following: Vec::new(),
-        }
-    }
-
     /// What no change of its numbers explains.
-    pub(super) fn beyond(&self, left: White) -> White {
+    fn beyond(&self, left: White) -> White {
         without_directions(left, &self.following)
     }
 }
 
 impl Atlas {
-    /// A hypothesis whose numbers follow an effect beside it.
-    pub(super) fn base(&self, simulate: &Simulate<'_>, hypothesis: Hypothesis) -> Base {
+    /// A hypothesis whose numbers stay as they are, in units of the declared model's scatter.
+    pub(super) fn at_rest(&self, hypothesis: Hypothesis) -> Base {
         Base {
-            following: self.directions(simulate, &hypothesis),
             hypothesis,
+            scatter: self.scatter.clone(),
+            following: Vec::new(),
         }
     }
 
-    /// What the numbers of a hypothesis do, as orthonormal directions.
-    pub(super) fn directions(&self, simulate: &Simulate<'_>, hypothesis: &Hypothesis) -> Vec<White> {
+    /// A hypothesis whose numbers follow an effect beside it.
+    pub(super) fn base(&self, simulate: &Simulate<'_>, hypothesis: Hypothesis) -> Base {
+        const SETS: u64 = 10;
+        let evaluated = self.evaluate(simulate, &hypothesis, SETS);
+        let scatter = evaluated.and_then(|evaluated| self.scatter_of(evaluated.summaries.iter(), 1));
+        let scatter = scatter.unwrap_or_else(|| self.scatter.clone());
+        Base {
+            following: self.directions(simulate, &hypothesis, &scatter),
+            hypothesis,
+            scatter,
+        }
+    }
+
+    /// What the numbers of a hypothesis do, as orthonormal directions in units of a scatter.
+    fn directions(
+        &self,
+        simulate: &Simulate<'_>,
+        hypothesis: &Hypothesis,
+        scatter: &[Scatter],
+    ) -> Vec<White> {
         const SETS: u64 = 4;
         let mut directions: Vec<White> = Vec::new();
         for group in groups(&hypothesis.freedoms(self)) {
@@ -59,7 +72,7 @@ impl Atlas {
             let (Some(up), Some(down)) = (at(1.0), at(-1.0)) else {
                 continue;
             };
-            let action = self.white(&up, &down);
+            let action = white(scatter, &self.layout, &up, &down);
             for freedom in &group {
                 let own = freedom.own_share(&action, &self.layout);
                 directions.extend(without_directions(own, &directions).try_normalize(f64::MIN_POSITIVE));
@@ -68,8 +81,21 @@ impl Atlas {
         directions
     }
 
-    /// What some simulated data sets leave of the data with further settings beside a base, but for what its numbers can
-    /// follow; `None` where the robot crashes.
+    /// What an expectation leaves of the data, in units of a base's scatter, but for what the base's numbers can follow.
+    pub(super) fn left_beyond(&self, data: &Expectation, base: &Base, expected: &Expectation) -> White {
+        base.beyond(white(&base.scatter, &self.layout, data, expected))
+    }
+
+    /// Every probe in every pattern at its size that explains most of what a base leaves, but for what the base's numbers can
+    /// follow, best first. What is left is given in units of the declared model's scatter.
+    fn screen_beside(&self, base: &Base, left: &White) -> Vec<Screened> {
+        let beyond =
+            |white: &White| base.beyond(in_other_units(white, &self.layout, &self.scatter, &base.scatter));
+        self.screen_by(&beyond(left), beyond)
+    }
+
+    /// What some simulated data sets leave of the data with further settings beside a base; see [`Atlas::left_beyond`]. `None`
+    /// where the robot crashes.
     pub(super) fn left_beside(
         &self,
         simulate: &Simulate<'_>,
@@ -82,7 +108,7 @@ impl Atlas {
         settings.extend_from_slice(further);
         let same_draws = self.declared_mean(sets.clone());
         let found = self.simulated_plainly(simulate, &settings, sets)?;
-        Some(base.beyond(self.white(data, &found.moved(1.0, &same_draws, &self.null))))
+        Some(self.left_beyond(data, base, &found.moved(1.0, &same_draws, &self.null)))
     }
 }
 
@@ -120,9 +146,7 @@ impl Search<'_> {
 
     /// What explains best what a base leaves, by paths: effects of its own and those that jump are left out.
     pub(super) fn screened_beside(&self, base: &Base, left: &White) -> Vec<Screened> {
-        let mut screened = self
-            .atlas
-            .screen_beside(&base.beyond(left.clone()), &base.following);
+        let mut screened = self.atlas.screen_beside(base, left);
         screened
             .retain(|other| !self.shares_effect(other, &base.hypothesis) && !self.jumps(&other.hypothesis));
         screened

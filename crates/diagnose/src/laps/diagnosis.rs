@@ -20,9 +20,9 @@ const SURELY_P: f64 = 1e-6;
 const ENOUGH: f64 = 0.98;
 /// The same for several effects, which have more freedom to be wrong.
 const ALL_BUT: f64 = 0.995;
-/// Share that several effects of a strong signal, or one without a name, must explain to be claimed in part.
+/// Share that several effects, or one without a name, must explain to be claimed in part.
 const MOST: f64 = 0.9;
-/// Score above which a signal is strong: the right names leave nothing significant of another, and what is left by up to three tells of
+/// Score above which a signal is strong: the right names leave next to nothing of another, and what is left by up to three tells of
 /// a cause that has none.
 const STRONG: f64 = 2000.0;
 /// Share up to which an explanation does not stand that leaves what is not likely, be it not significant: of weak signals chance
@@ -114,8 +114,8 @@ impl Atlas {
             runs,
         };
         let mut found = explain(&search, &screened);
-        // Candidates share their draws, so that much of the error is common to them.
-        let behind = ALTERNATIVE + found.first().map_or(0.0, |best| best.gain_error);
+        // Candidates share their draws, so that much of the error is common to them: it counts where it is large.
+        let behind = ALTERNATIVE.max(2.0 * found.first().map_or(0.0, |best| best.gain_error));
         let indistinguishable = indistinguishable(found.iter().map(|found| &found.explanation), behind);
         let verdict = found.first().map(|best| verdict_of(&best.explanation));
         let verdict = verdict.unwrap_or(Verdict::Unexplained);
@@ -170,8 +170,12 @@ fn explain(search: &Search<'_>, screened: &[Screened]) -> Vec<Found> {
     sort(&mut found);
     let leaves_next_to_nothing = |best: &Explanation| best.share >= ENOUGH && !goes_over_runs_or_time(best);
     let pairs = match found.first() {
-        Some(best) if stands_alone(&best.explanation) => search.pairs_with(best, true),
-        Some(best) if leaves_next_to_nothing(&best.explanation) => search.pairs_with(best, false),
+        Some(best) if stands_alone(&best.explanation) => {
+            search.pairs_with(best, true, faults_beside(&best.explanation))
+        }
+        Some(best) if leaves_next_to_nothing(&best.explanation) => {
+            search.pairs_with(best, false, faults_beside(&best.explanation))
+        }
         _ => search.pairs(&found),
     };
     found = preferred(found, pairs);
@@ -193,8 +197,9 @@ fn explain(search: &Search<'_>, screened: &[Screened]) -> Vec<Found> {
         let further = search.further(alike);
         found = preferred(found, further);
     }
-    // No cause without a name explains what several with theirs explain nearly all of.
-    let nearly_all = |best: &Explanation| best.effects.len() > 1 && best.share >= ENOUGH;
+    // No cause without a name explains what several with theirs explain nearly all of, or one but for the faults of models.
+    let nearly_all =
+        |best: &Explanation| best.share >= 1.0 - FAULTS || best.effects.len() > 1 && best.share >= ENOUGH;
     if !first_is(&found, |best| suffices(best) || nearly_all(best)) {
         found = unless_named(found, search.unnamed());
     }
@@ -230,11 +235,11 @@ fn verdict_of(best: &Explanation) -> Verdict {
             Verdict::Explained
         };
     }
-    let several = best.effects.len() > 1 && best.score > STRONG;
-    let enough = if best.has_no_name() || several {
-        MOST
-    } else {
-        ENOUGH
+    let enough = match best.effects.len() {
+        _ if best.has_no_name() => MOST,
+        _ if best.score <= STRONG => return Verdict::Unexplained,
+        1 => ENOUGH,
+        _ => MOST,
     };
     if best.share >= enough {
         Verdict::PartlyExplained
@@ -271,13 +276,22 @@ fn preferred(fewer: Vec<Found>, more: Vec<Found>) -> Vec<Found> {
     };
     let better = fits(b) || b.share >= ALL_BUT || !suffices(a) && b.share > a.share;
     let worth = if suffices(a) { WORTH_BESIDE } else { WORTH };
-    let faults = if fits(b) && !suffices(a) {
-        0.0
+    let faults = if fits(b) {
+        faults_beside(a)
     } else {
         FAULTS * a.gain
     };
     let wins = gained > faults.max(worth * numbers.max(1) as f64) && better && !heaps_noise(b);
     with_first(wins, more, fewer)
+}
+
+/// What the faults of models may gain beside an explanation: more effects that fit must gain more if it stands without them.
+fn faults_beside(explanation: &Explanation) -> f64 {
+    if suffices(explanation) {
+        FAULTS * explanation.gain
+    } else {
+        0.0
+    }
 }
 
 /// Two lists as one, the first of them first if it wins.

@@ -292,6 +292,16 @@ impl Scatter {
         self.mean.l() * white
     }
 
+    /// The vector of [`Scatter::whiten`].
+    pub(super) fn unwhiten(&self, white: &DVector<f64>) -> DVector<f64> {
+        self.lap.l() * white
+    }
+
+    /// The numbers of [`Scatter::whiten_second`].
+    pub(super) fn unwhiten_second(&self, white: &DVector<f64>) -> DVector<f64> {
+        self.second.l() * white
+    }
+
     /// log det of the covariance of the second-order numbers.
     pub(super) fn log_det_second(&self) -> f64 {
         2.0 * self.second.l_dirty().diagonal().map(f64::ln).sum()

@@ -50,7 +50,7 @@ impl Atlas {
             self.evaluate(simulate, &base.hypothesis, CLOSER[0])?.expectation
         };
         let chance = self.layout.len() as f64;
-        let excess = base.beyond(self.white(data, &without)).norm_squared() - chance;
+        let excess = self.left_beyond(data, base, &without).norm_squared() - chance;
         let sets = if excess < LITTLE * chance { PAIRS } else { ONE };
         let (left, size) = least(&self.distances(simulate, data, base, probe, &sizes, &sets))?;
         let fair = left - chance < (1.0 - FAIR_SHARE) * excess;
@@ -130,7 +130,7 @@ impl Atlas {
 
     /// The hunt that ended with a part of a hypothesis, as far off as its size may be; `None` of other parts.
     fn hunt_of(&self, hypothesis: &Hypothesis, part: usize) -> Option<Hunt> {
-        let base = Base::at_rest(hypothesis.without(part));
+        let base = self.at_rest(hypothesis.without(part));
         let part = &hypothesis.parts[part];
         Some(Hunt {
             base,

@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use rayon::prelude::*;
 use sim::UNLISTED;
 
 use super::atlas::{Atlas, White};
@@ -33,19 +34,20 @@ pub(super) fn price(parameters: usize, laps: usize) -> f64 {
 impl Atlas {
     /// Every probe in every pattern at its best size, best first.
     pub(super) fn screen(&self, residual: &White) -> Vec<Screened> {
-        self.screen_beside(residual, &[])
+        self.screen_by(residual, White::clone)
     }
 
-    /// The same of what a hypothesis leaves beyond orthonormal directions, along which its own numbers follow.
-    pub(super) fn screen_beside(&self, left: &White, following: &[White]) -> Vec<Screened> {
+    /// The same by actions that are seen in another way, in which the residual is given.
+    pub(super) fn screen_by(&self, residual: &White, seen: impl Fn(&White) -> White + Sync) -> Vec<Screened> {
         let mut all: Vec<Screened> = (0..self.probes.len())
-            .flat_map(|probe| {
+            .into_par_iter()
+            .flat_map_iter(|probe| {
                 let mut nodes = self.nodes(probe);
                 for (_, action) in &mut nodes {
-                    *action = without_directions(std::mem::take(action), following);
+                    *action = seen(action);
                 }
                 [Shape::Constant, Shape::ByRun, Shape::ByTime]
-                    .map(|shape| self.screen_one(probe, &nodes, shape, left))
+                    .map(|shape| self.screen_one(probe, &nodes, shape, residual))
             })
             .flatten()
             .collect();

@@ -7,7 +7,6 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use super::atlas::{Atlas, Simulate, White};
-use super::beside::Base;
 use super::expectation::Expectation;
 use super::hunt::Hunt;
 use super::hypothesis::{Freedom, Hypothesis, Part, Shape};
@@ -170,7 +169,7 @@ impl Search<'_> {
     }
 
     fn scan(&self, probe: usize) -> Option<Found> {
-        let nothing = Base::at_rest(Hypothesis { parts: Vec::new() });
+        let nothing = self.atlas.at_rest(Hypothesis { parts: Vec::new() });
         let (_, hunt) = (self.atlas).hunt(self.simulate, self.data, &nothing, probe)?;
         let found = self.atlas.hunted(self.simulate, self.data, &hunt)?;
         let end = Descent::start(self.atlas, &found);
@@ -178,9 +177,12 @@ impl Search<'_> {
         Some(self.found(&settled))
     }
 
-    /// Effects whose action jumps with their size beside the best single effects and beside either of the best pair's.
+    /// Effects whose action jumps with their size beside the best single effects and beside either of the best pair's; those that
+    /// come nowhere near the best are not tried to the end.
     pub(super) fn scans_beside(&self, found: &[Found]) -> Vec<Found> {
         const CLOSER: usize = 2;
+        /// Share of the best score that is near: the size beside effects that stay is not yet the best.
+        const NEAR: f64 = 0.8;
         let mut bases: Vec<Hypothesis> = Vec::new();
         for part in found.iter().flat_map(|found| &found.hypothesis.parts) {
             let spec = |part: &Part| self.atlas.probes[part.probe].spec;
@@ -205,7 +207,9 @@ impl Search<'_> {
         let starts: Vec<Hypothesis> = (hunts.iter().take(CLOSER))
             .filter_map(|(_, hunt)| self.atlas.hunted(self.simulate, self.data, hunt))
             .collect();
-        self.settle(self.descend_several(&starts, &ROUNDS_OF_SEVERAL, f64::NEG_INFINITY))
+        let near = found.first().map(|best| NEAR * best.explanation.score);
+        let near = near.unwrap_or(f64::NEG_INFINITY);
+        self.settle(self.descend_several(&starts, &ROUNDS_OF_SEVERAL, near))
     }
 
     fn jumping(&self) -> impl Iterator<Item = usize> {
@@ -269,21 +273,24 @@ impl Search<'_> {
     }
 
     /// The best pairs of a single effect that explains nearly all, tried to the end: those with what explains best what it
-    /// leaves, if anything gains there what a further effect must. Beside an effect that stands alone it must promise more, and
-    /// by one size: effects change the scatter, and sizes that go over the runs follow that.
-    pub(super) fn pairs_with(&self, single: &Found, stands: bool) -> Vec<Found> {
+    /// leaves, if anything gains there what a further effect must, and a fair share of what the faults of models may. Beside an
+    /// effect that stands alone it must promise more, and by one size: effects change the scatter, and sizes that go over the
+    /// runs follow that.
+    pub(super) fn pairs_with(&self, single: &Found, stands: bool, faults: f64) -> Vec<Found> {
+        const FAIR_SHARE: f64 = 0.3;
         /// Score of the least that could turn out to be worth its numbers.
         const PROMISING: f64 = 5.0;
         const PROMISING_BESIDE: f64 = 10.0;
+        let least = FAIR_SHARE * faults;
         let base = self.atlas.base(self.simulate, single.hypothesis.clone());
         let mut screened = self.screened_beside(&base, &single.left);
         screened.retain(|other| !stands || other.hypothesis.is_constant());
         let enough = if stands { PROMISING_BESIDE } else { PROMISING };
-        if screened.first().is_none_or(|best| best.score < enough) {
+        if screened.first().is_none_or(|best| best.score < enough.max(least)) {
             return Vec::new();
         }
         let heard = self.heard_beside(&base, screened);
-        if heard.first().is_none_or(|best| best.score < PROMISING) {
+        if heard.first().is_none_or(|best| best.score < PROMISING.max(least)) {
             return Vec::new();
         }
         let starts = self.beside_of(&heard, &base, &single.left, &[]);
@@ -486,6 +493,7 @@ impl Search<'_> {
             let Some(best) = best.filter(|best| best.parts.len() > 1 && best.parts.iter().any(held)) else {
                 break;
             };
+            let before = best_of(&descents).map_or(0.0, |best| best.score);
             let Some(hunted) = self.atlas.hunt_again(self.simulate, self.data, best) else {
                 break;
             };
@@ -498,7 +506,8 @@ impl Search<'_> {
                     self.atlas.descend(self.simulate, self.data, start, Round::Full)
                 })
                 .collect();
-            if rest {
+            let in_vain = |best: &Descent| best.leaves_far_too_much() && is_slow(best, best.score - before);
+            if rest || best_of(&descents).is_some_and(in_vain) {
                 break;
             }
         }
@@ -611,8 +620,12 @@ const SLOW: f64 = 0.1;
 
 /// Whether the best descent leaves far too much and does not get on: more rounds would not make an answer of it.
 fn is_hopeless(descent: &Descent) -> bool {
-    descent.leaves_far_too_much()
-        && (descent.remainder).is_some_and(|left| descent.progress < SLOW * 0.5 * left.excess())
+    descent.leaves_far_too_much() && is_slow(descent, descent.progress)
+}
+
+/// Whether a descent that made such progress would not arrive at where it leaves nothing.
+fn is_slow(descent: &Descent, progress: f64) -> bool {
+    (descent.remainder).is_some_and(|left| progress < SLOW * 0.5 * left.excess())
 }
 
 /// Whether a descent is near a better one, or comes nearer.

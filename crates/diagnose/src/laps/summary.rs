@@ -129,12 +129,12 @@ fn summarise(laps: &[DVector<f64>]) -> RunSummary {
 
 /// How the laps scatter, as [`SECOND`] numbers: log variance about the means of a run's quarters in 10 blocks of gates and
 /// 5 of durations; log mean square of second differences along the lap at spacing 1 and 5 gates, and log kurtosis of the
-/// first; kurtosis and skewness of the durations.
+/// first, winsorised; kurtosis and skewness of the durations.
 fn second_order(runs: &[Vec<DVector<f64>>]) -> DVector<f64> {
     let size = runs[0][0].len();
     let gates = size - BLOCKS;
     let (mut squares, mut freedom) = (DVector::<f64>::zeros(size), 0.0);
-    let (mut rough1, mut rough5) = (Moments::default(), Moments::default());
+    let (mut bends, mut rough5) = (Vec::new(), Moments::default());
     let mut durations = Moments::default();
     for quarter in runs.iter().flat_map(|laps| quarters(laps)) {
         let mean = quarter.iter().sum::<DVector<f64>>() / quarter.len() as f64;
@@ -142,9 +142,7 @@ fn second_order(runs: &[Vec<DVector<f64>>]) -> DVector<f64> {
         for lap in quarter {
             let deviation = lap - &mean;
             squares += deviation.component_mul(&deviation);
-            for g in 1..gates - 1 {
-                rough1.add(deviation[g - 1] - 2.0 * deviation[g] + deviation[g + 1]);
-            }
+            bends.extend((1..gates - 1).map(|g| deviation[g - 1] - 2.0 * deviation[g] + deviation[g + 1]));
             for g in 5..gates.saturating_sub(5) {
                 rough5.add(deviation[g - 5] - 2.0 * deviation[g] + deviation[g + 5]);
             }
@@ -157,9 +155,9 @@ fn second_order(runs: &[Vec<DVector<f64>>]) -> DVector<f64> {
     let variances = stretches(size)
         .map(|part| (squares.rows(part.start, part.len()).sum() / freedom / part.len() as f64).ln());
     let others = [
-        rough1.square().ln(),
+        Moments::of(&bends).square().ln(),
         rough5.square().ln(),
-        rough1.kurtosis().ln(),
+        Moments::of(&winsorised(bends)).kurtosis().ln(),
         durations.kurtosis(),
         durations.skewness(),
     ];
@@ -180,11 +178,29 @@ fn quarters(laps: &[DVector<f64>]) -> impl Iterator<Item = &[DVector<f64>]> {
     (0..parts).map(move |k| &laps[k * laps.len() / parts..(k + 1) * laps.len() / parts])
 }
 
+/// Values of which the largest, one in a thousand, are brought to the next: a lap that once went far astray would decide their
+/// fourth moment.
+fn winsorised(mut values: Vec<f64>) -> Vec<f64> {
+    let cut = values.len() / 1000;
+    if cut > 0 {
+        let mut sizes: Vec<f64> = values.iter().map(|x| x.abs()).collect();
+        let (_, &mut most, _) = sizes.select_nth_unstable_by(cut, |a, b| b.total_cmp(a));
+        values.iter_mut().for_each(|x| *x = x.clamp(-most, most));
+    }
+    values
+}
+
 /// Sums of the first four powers.
 #[derive(Debug, Default)]
 struct Moments([f64; 5]);
 
 impl Moments {
+    fn of(values: &[f64]) -> Self {
+        let mut moments = Self::default();
+        values.iter().for_each(|&x| moments.add(x));
+        moments
+    }
+
     fn add(&mut self, x: f64) {
         let mut power = 1.0;
         for sum in &mut self.0 {
@@ -207,5 +223,24 @@ impl Moments {
 
     fn skewness(&self) -> f64 {
         self.about_zero(3) / self.square().powf(1.5)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_lap_far_astray_does_not_decide_the_kurtosis() {
+        // Quantiles of a uniform law on [-1, 1], whose kurtosis is 9/5.
+        let uniform: Vec<f64> = (0..4000).map(|i| (f64::from(i) - 1999.5) / 2000.0).collect();
+        let astray: Vec<f64> = uniform.iter().copied().chain([30.0, -20.0, 10.0]).collect();
+        assert!(Moments::of(&astray).kurtosis() > 100.0);
+        for values in [uniform, astray] {
+            let kurtosis = Moments::of(&winsorised(values)).kurtosis();
+            assert!((kurtosis - 1.8).abs() < 0.01, "{kurtosis}");
+        }
+        // Too few to leave any out.
+        assert_eq!(winsorised(vec![1.0, -7.0]), [1.0, -7.0]);
     }
 }

@@ -1,5 +1,7 @@
 //! The decide stage: the commands are recomputed from the logged readings, and what is left is exact.
 
+use std::collections::BTreeMap;
+
 use sim::{Controller, Model, Pattern, Setting, find};
 
 use super::rows::LogRow;
@@ -21,11 +23,9 @@ pub enum Decided {
     Unknown,
 }
 
-/// Largest errors of a written number: speeds have 5 decimals, readings 1.
+/// Largest error of a written speed, which has 5 decimals, and its standard deviation.
 const SPEED_ROUNDING_M_S: f64 = 6e-6;
-const SUM_ROUNDING_COUNTS: f64 = 0.16;
-/// Standard deviation of that of a sum of three readings.
-const SUM_DEVIATION_COUNTS: f64 = 0.05;
+const SPEED_DEVIATION_M_S: f64 = 3e-6;
 /// Share of the control steps that may miss by more, where a command was cut or a file was mended.
 const FORGIVEN: f64 = 2e-3;
 /// Relative change of a constant below which it is the declared one.
@@ -39,6 +39,26 @@ struct Choice {
     left_counts: f64,
     left_m_s: f64,
     right_m_s: f64,
+}
+
+/// What one run's log says of the controller.
+#[derive(Debug)]
+struct Run {
+    choices: Vec<Choice>,
+    /// What its readings are multiples of: 0.1 where they have one decimal.
+    written_counts: f64,
+}
+
+impl Run {
+    /// Largest error of a sum of three readings.
+    fn sum_rounding_counts(&self) -> f64 {
+        1.6 * self.written_counts
+    }
+
+    /// Standard deviation of the error of a sum of three readings.
+    fn sum_deviation_counts(&self) -> f64 {
+        0.5 * self.written_counts
+    }
 }
 
 /// A line over time: value at the run's start and change per second.
@@ -59,13 +79,18 @@ pub(crate) fn decided(model: &Model, runs: &[&[LogRow]]) -> Decided {
     if share > FORGIVEN {
         return Decided::NoController { share };
     }
-    let choices: Vec<Vec<Choice>> = runs.iter().map(|rows| choices(model, rows)).collect();
-    if choices.iter().all(Vec::is_empty) {
+    let runs: Vec<Run> = (runs.iter())
+        .map(|rows| Run {
+            choices: choices(model, rows),
+            written_counts: written_counts(rows),
+        })
+        .collect();
+    if runs.iter().all(|run| run.choices.is_empty()) {
         return Decided::Unknown;
     }
     let fit = |sloped: bool| -> Vec<Option<Constants>> {
-        (choices.iter())
-            .map(|run| (!run.is_empty()).then(|| constants(model, run, sloped)))
+        (runs.iter())
+            .map(|run| (!run.choices.is_empty()).then(|| constants(model, run, sloped)))
             .collect()
     };
     let fits = |found: &[Option<Constants>]| found.iter().flatten().all(|run| run.missed <= FORGIVEN);
@@ -124,6 +149,19 @@ fn beyond_limit(model: &Model, runs: &[&[LogRow]]) -> f64 {
     beyond / all.max(1.0)
 }
 
+/// The power of ten, at most 0.1, that all readings of a log are multiples of.
+fn written_counts(rows: &[LogRow]) -> f64 {
+    const DECIMALS: std::ops::RangeInclusive<i32> = 1..=6;
+    let all_are_multiples = |decimals: &i32| {
+        let scale = 10.0_f64.powi(*decimals);
+        let is_multiple = |reading: &f64| (scale * reading - (scale * reading).round()).abs() < 1e-4;
+        let mut readings = rows.iter().filter_map(LogRow::read);
+        readings.all(|readings| readings.iter().all(is_multiple))
+    };
+    let decimals = DECIMALS.clone().find(all_are_multiples);
+    10.0_f64.powi(-decimals.unwrap_or(*DECIMALS.end()))
+}
+
 fn choices(model: &Model, rows: &[LogRow]) -> Vec<Choice> {
     let limit_m_s = model.machine.robot.wheel_speed_limit_m_s - 2e-5;
     (rows.iter().filter(|row| row.commands()))
@@ -139,7 +177,7 @@ fn choices(model: &Model, rows: &[LogRow]) -> Vec<Choice> {
         .collect()
 }
 
-fn constants(model: &Model, run: &[Choice], sloped: bool) -> Constants {
+fn constants(model: &Model, run: &Run, sloped: bool) -> Constants {
     match model.machine.controller {
         Controller::Braitenberg { .. } => braitenberg(run, sloped),
         Controller::RuleBased { threshold_counts, .. } => rules(run, threshold_counts, sloped),
@@ -147,15 +185,18 @@ fn constants(model: &Model, run: &[Choice], sloped: bool) -> Constants {
 }
 
 /// V and K by least squares: the mean of the speeds is V, half their difference V K (Sl - Sr).
-fn braitenberg(run: &[Choice], sloped: bool) -> Constants {
+fn braitenberg(run: &Run, sloped: bool) -> Constants {
+    let choices = &run.choices;
     let mean = line(
-        run.iter()
+        choices
+            .iter()
             .map(|c| (c.time_s, 1.0, 0.5 * (c.left_m_s + c.right_m_s))),
         sloped,
     );
     let difference = |c: &Choice| c.left_counts - c.right_counts;
     let product = line(
-        run.iter()
+        choices
+            .iter()
             .map(|c| (c.time_s, difference(c), 0.5 * (c.left_m_s - c.right_m_s))),
         sloped,
     );
@@ -164,35 +205,51 @@ fn braitenberg(run: &[Choice], sloped: bool) -> Constants {
         let slope = product[0] + product[1] * c.time_s;
         let turn = slope * difference(c);
         let allowed = SPEED_ROUNDING_M_S
-            + 2.0 * SUM_ROUNDING_COUNTS * slope.abs()
+            + 2.0 * run.sum_rounding_counts() * slope.abs()
             + 2e-4 * speed.abs() * f64::from(u8::from(sloped));
         (c.left_m_s - speed - turn)
             .abs()
             .max((c.right_m_s - speed + turn).abs())
             > allowed
     };
-    let count = run.len() as f64;
-    let spread: f64 = run.iter().map(|c| difference(c).powi(2)).sum();
     let gain = product[0] / mean[0];
+    let deviation_m_s =
+        SPEED_DEVIATION_M_S.hypot(product[0] * std::f64::consts::SQRT_2 * run.sum_deviation_counts());
+    let slope_error = deviation_m_s * error_of_slope(choices.iter().map(difference), run.written_counts);
     Constants {
         speed_m_s: mean,
         // (a + b t) / (c + d t) to first order in time.
         parameter: [gain, (product[1] - gain * mean[1]) / mean[0]],
-        parameter_error: 3e-6 / mean[0].abs() / spread.max(1e-12).sqrt() + 1e-9 * gain.abs(),
-        missed: run.iter().filter(missed).count() as f64 / count,
+        parameter_error: slope_error / mean[0].abs() + 1e-9 * gain.abs(),
+        missed: choices.iter().filter(missed).count() as f64 / choices.len() as f64,
     }
 }
 
+/// Error of the slope of a line through the origin, where points with the same x share an error of unit
+/// variance: what is rounded alike is off alike.
+fn error_of_slope(x: impl Iterator<Item = f64>, written: f64) -> f64 {
+    let (mut of_value, mut squares) = (BTreeMap::<i64, f64>::new(), 0.0_f64);
+    for x in x {
+        *of_value.entry((x / written).round() as i64).or_default() += x;
+        squares += x * x;
+    }
+    let shared: f64 = of_value.values().map(|sum| sum * sum).sum();
+    shared.sqrt() / squares.max(1e-12)
+}
+
 /// V from the speeds' size, T from between the sums that turned the robot and those that did not.
-fn rules(run: &[Choice], declared_counts: f64, sloped: bool) -> Constants {
+fn rules(run: &Run, declared_counts: f64, sloped: bool) -> Constants {
+    let choices = &run.choices;
+    let rounding_counts = 2.0 * run.sum_rounding_counts();
     let speed = line(
-        run.iter()
+        choices
+            .iter()
             .map(|c| (c.time_s, 1.0, 0.5 * (c.left_m_s.abs() + c.right_m_s.abs()))),
         sloped,
     );
     let bracket = |slope: f64| {
         let (mut low, mut high) = (0.0_f64, f64::INFINITY);
-        for c in run {
+        for c in choices {
             let (turns_left, turns_right) = (c.left_m_s < 0.0, c.right_m_s < 0.0);
             let [right, left] = [c.right_counts, c.left_counts].map(|sum| sum - slope * c.time_s);
             if turns_left {
@@ -210,15 +267,14 @@ fn rules(run: &[Choice], declared_counts: f64, sloped: bool) -> Constants {
         }
         (low, high)
     };
-    let end_s = run.last().map_or(1.0, |c| c.time_s.max(1.0));
+    let end_s = choices.last().map_or(1.0, |c| c.time_s.max(1.0));
     let slopes = if sloped { 400 } else { 0 };
     let slope = (-slopes..=slopes)
         .map(|i| f64::from(i) / 400.0 * declared_counts / end_s)
         .max_by(|a, b| (bracket(*a).1 - bracket(*a).0).total_cmp(&(bracket(*b).1 - bracket(*b).0)))
         .unwrap_or(0.0);
     let (low, high) = bracket(slope);
-    let inside =
-        (low - 2.0 * SUM_ROUNDING_COUNTS..=high + 2.0 * SUM_ROUNDING_COUNTS).contains(&declared_counts);
+    let inside = (low - rounding_counts..=high + rounding_counts).contains(&declared_counts);
     let threshold = if inside && slope == 0.0 {
         declared_counts
     } else {
@@ -226,9 +282,8 @@ fn rules(run: &[Choice], declared_counts: f64, sloped: bool) -> Constants {
     };
     let missed = |c: &&Choice| {
         let limit = threshold + slope * c.time_s;
-        let near = |sum: f64| {
-            (sum - limit).abs() <= 2.0 * SUM_ROUNDING_COUNTS + 0.01 * limit * f64::from(u8::from(sloped))
-        };
+        let near =
+            |sum: f64| (sum - limit).abs() <= rounding_counts + 0.01 * limit * f64::from(u8::from(sloped));
         let turns_left = c.right_counts > limit;
         let turns_right = !turns_left && c.left_counts > limit;
         let size = speed[0] + speed[1] * c.time_s;
@@ -244,9 +299,9 @@ fn rules(run: &[Choice], declared_counts: f64, sloped: bool) -> Constants {
         speed_m_s: speed,
         parameter: [threshold, slope],
         parameter_error: ((high - low) / 12.0_f64.sqrt())
-            .hypot(SUM_DEVIATION_COUNTS)
+            .hypot(run.sum_deviation_counts())
             .min(0.1 * declared_counts),
-        missed: run.iter().filter(missed).count() as f64 / run.len() as f64,
+        missed: choices.iter().filter(missed).count() as f64 / choices.len() as f64,
     }
 }
 
@@ -335,16 +390,47 @@ mod tests {
     }
 
     #[test]
+    fn readings_that_repeat_do_not_average_their_rounding() {
+        const SPEED_M_S: f64 = 0.06;
+        const GAIN: f64 = 0.003;
+        let rounded = |x: f64, to: f64| (x / to).round() * to;
+        // Readings in steps of 141.283 counts are written as 141.3 and 282.6, and give few speeds.
+        let step = |i: usize| {
+            let (right, left) = ([0.0, 141.283][i % 2], [141.283, 282.566, 0.0][i % 3]);
+            let turn = SPEED_M_S * GAIN * (left - right);
+            Choice {
+                time_s: 0.064 * i as f64,
+                right_counts: rounded(right, 0.1),
+                left_counts: rounded(left, 0.1),
+                left_m_s: rounded(SPEED_M_S + turn, 1e-5),
+                right_m_s: rounded(SPEED_M_S - turn, 1e-5),
+            }
+        };
+        let run = Run {
+            choices: (0..6000).map(step).collect(),
+            written_counts: 0.1,
+        };
+        let found = braitenberg(&run, false);
+        let off = (found.parameter[0] - GAIN).abs();
+        assert!(off > 1e-5 * GAIN, "rounding is to be seen: {found:?}");
+        assert!(off < 3.0 * found.parameter_error, "{found:?}");
+        assert!(found.parameter_error < 1e-3 * GAIN, "{found:?}");
+    }
+
+    #[test]
     fn a_threshold_is_no_better_known_than_the_readings_are_written() {
         const THRESHOLD: f64 = 410.02;
         let sums = [409.97, 410.03, 400.0, 420.0];
-        let run: Vec<Choice> = (sums.iter().enumerate())
-            .map(|(i, sum)| chosen(0.064 * i as f64, *sum, THRESHOLD))
-            .collect();
+        let run = Run {
+            choices: (sums.iter().enumerate())
+                .map(|(i, sum)| chosen(0.064 * i as f64, *sum, THRESHOLD))
+                .collect(),
+            written_counts: 0.1,
+        };
         let found = rules(&run, 300.0, false);
         // Both sums next to the threshold are written as 410.0.
         assert!((found.parameter[0] - 410.0).abs() < 1e-9, "{found:?}");
-        assert!(found.parameter_error >= SUM_DEVIATION_COUNTS, "{found:?}");
+        assert!(found.parameter_error >= run.sum_deviation_counts(), "{found:?}");
         assert_eq!(found.missed, 0.0);
     }
 }
