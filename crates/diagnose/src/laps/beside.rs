@@ -18,7 +18,8 @@ use super::search::{Search, WEAK};
 #[derive(Debug, Clone)]
 pub(super) struct Base {
     pub(super) hypothesis: Hypothesis,
-    /// How its recordings scatter: what is sought has to stand out from that.
+    /// What is sought has to stand out from this: how the base's recordings scatter if it explains nearly all. A noise that does
+    /// not is too large, because it stands for what is sought too, and the declared model's scatter is the better guess.
     scatter: Vec<Scatter>,
     /// What its numbers do, as orthonormal directions in units of its scatter: they follow the other effect. None if they stay.
     following: Vec<White>,
@@ -42,10 +43,14 @@ impl Atlas {
     }
 
     /// A hypothesis whose numbers follow an effect beside it.
-    pub(super) fn base(&self, simulate: &Simulate<'_>, hypothesis: Hypothesis) -> Base {
+    pub(super) fn base(&self, simulate: &Simulate<'_>, data: &Expectation, hypothesis: Hypothesis) -> Base {
         const SETS: u64 = 10;
+        const NEARLY_ALL: f64 = 0.95;
+        let excess = |from: &Expectation| self.white(data, from).norm_squared() - self.layout.len() as f64;
         let evaluated = self.evaluate(simulate, &hypothesis, SETS);
-        let scatter = evaluated.and_then(|evaluated| self.scatter_of(evaluated.summaries.iter(), 1));
+        let scatter = evaluated
+            .filter(|evaluated| excess(&evaluated.expectation) < (1.0 - NEARLY_ALL) * excess(&self.null))
+            .and_then(|evaluated| self.scatter_of(evaluated.summaries.iter(), 1));
         let scatter = scatter.unwrap_or_else(|| self.scatter.clone());
         Base {
             following: self.directions(simulate, &hypothesis, &scatter),
@@ -113,6 +118,11 @@ impl Atlas {
 }
 
 impl Search<'_> {
+    /// A hypothesis whose numbers follow an effect beside it, for these data.
+    pub(super) fn base(&self, hypothesis: Hypothesis) -> Base {
+        self.atlas.base(self.simulate, self.data, hypothesis)
+    }
+
     /// A base with each of the effects that explain best what it leaves, but for those that were tried and for those that
     /// jump: [`Search::scans_beside`] is for these.
     pub(super) fn beside(&self, base: &Base, left: &White, tried: &[Hypothesis]) -> Vec<Hypothesis> {
@@ -220,7 +230,7 @@ impl Search<'_> {
         for kept in &pair.hypothesis.parts {
             let alone = Hypothesis::of(kept.clone());
             if let Some(left) = self.left_by(&alone) {
-                let base = self.atlas.base(self.simulate, alone);
+                let base = self.base(alone);
                 let others = self.beside(&base, &left, &all);
                 all.extend(others);
             }

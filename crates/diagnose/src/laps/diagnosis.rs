@@ -28,7 +28,7 @@ const STRONG: f64 = 2000.0;
 /// Share up to which an explanation does not stand that leaves what is not likely, be it not significant: of weak signals chance
 /// alone explains as much.
 const TOO_LITTLE: f64 = 0.7;
-/// A cause without a name that explains as much as named ones but for this share comes first.
+/// A share that is less by so much is as good.
 const AS_GOOD: f64 = 0.01;
 /// Log-likelihood that each number of a further effect must gain.
 const WORTH: f64 = 10.0;
@@ -250,13 +250,14 @@ fn verdict_of(best: &Explanation) -> Verdict {
 
 /// Whether an explanation needs several effects on noise: they are more likely one that has no name.
 fn heaps_noise(explanation: &Explanation) -> bool {
+    noises(explanation) > 1
+}
+
+/// The number of effects on noise.
+fn noises(explanation: &Explanation) -> usize {
     const NOISE: [&str; 4] = ["slip-level", "slip-memory", "reading-noise", "camera-noise"];
-    explanation
-        .names()
-        .iter()
-        .filter(|name| NOISE.contains(name))
-        .count()
-        > 1
+    let names = explanation.names();
+    names.iter().filter(|name| NOISE.contains(name)).count()
 }
 
 /// More effects come before fewer only if each number of the further ones gains enough, and if they fit where the fewer do
@@ -274,7 +275,9 @@ fn preferred(fewer: Vec<Found>, more: Vec<Found>) -> Vec<Found> {
     } else {
         b.gain - a.gain
     };
-    let better = fits(b) || b.share >= ALL_BUT || !suffices(a) && b.share > a.share;
+    // Noise that is too large covers what it does not explain.
+    let covered = if noises(a) > 0 { AS_GOOD } else { 0.0 };
+    let better = fits(b) || b.share >= ALL_BUT || !suffices(a) && b.share > a.share - covered;
     let worth = if suffices(a) { WORTH_BESIDE } else { WORTH };
     let faults = if fits(b) {
         faults_beside(a)

@@ -88,7 +88,7 @@ impl Atlas {
         const OFF: f64 = 0.04;
         self.hunt_each(simulate, data, hypothesis, &CLOSER, |hunt| {
             hunt.spacing = OFF * hunt.size;
-            hunt.base = self.base(simulate, hunt.base.hypothesis.clone());
+            hunt.base = self.base(simulate, data, hunt.base.hypothesis.clone());
         })
     }
 

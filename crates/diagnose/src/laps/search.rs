@@ -195,7 +195,7 @@ impl Search<'_> {
         let mut hunts: Vec<(f64, Hunt)> = Vec::new();
         for base in bases {
             let spec = self.atlas.probes[base.parts[0].probe].spec;
-            let base = self.atlas.base(self.simulate, base);
+            let base = self.base(base);
             for probe in self
                 .jumping()
                 .filter(|&probe| self.atlas.probes[probe].spec != spec)
@@ -265,7 +265,7 @@ impl Search<'_> {
         let screened = self.atlas.screen_pairs(self.residual, PAIRS);
         let mut starts: Vec<Hypothesis> = screened.into_iter().map(|pair| pair.hypothesis).collect();
         for single in of_other_effects(singles.iter()).into_iter().take(BASES) {
-            let base = self.atlas.base(self.simulate, single.hypothesis.clone());
+            let base = self.base(single.hypothesis.clone());
             let further = self.beside(&base, &single.left, &starts);
             starts.extend(further);
         }
@@ -282,7 +282,7 @@ impl Search<'_> {
         const PROMISING: f64 = 5.0;
         const PROMISING_BESIDE: f64 = 10.0;
         let least = FAIR_SHARE * faults;
-        let base = self.atlas.base(self.simulate, single.hypothesis.clone());
+        let base = self.base(single.hypothesis.clone());
         let mut screened = self.screened_beside(&base, &single.left);
         screened.retain(|other| !stands || other.hypothesis.is_constant());
         let enough = if stands { PROMISING_BESIDE } else { PROMISING };
@@ -314,7 +314,7 @@ impl Search<'_> {
         let mut starts: Vec<Hypothesis> = Vec::new();
         for base in of_other_effects(best).into_iter().take(BASES) {
             let left = &base.left;
-            let base = self.atlas.base(self.simulate, base.hypothesis.clone());
+            let base = self.base(base.hypothesis.clone());
             let further = self.beside(&base, left, &starts);
             starts.extend(further);
         }

@@ -15,6 +15,9 @@ pub(crate) struct Cut {
 /// `step` (0 for none) and cut to [0, inf).
 #[inline]
 pub(crate) fn cut(mean: f64, deviation: f64, step: f64) -> Cut {
+    /// Least variance of what is cut, in units of the uncut one's: a reading that is surely 0 is then about twice as likely, like
+    /// its probability, as one that is 0 half of the time, and one that is not 0 after all is no proof of the contrary.
+    const LEAST: f64 = 0.16;
     if step > 0.0 {
         return rounded(mean, deviation, step);
     }
@@ -39,7 +42,7 @@ pub(crate) fn cut(mean: f64, deviation: f64, step: f64) -> Cut {
     let second = (mean * mean + deviation * deviation) * open + mean * deviation * density;
     Cut {
         mean: first,
-        variance: (second - first * first).max(1e-6 * deviation * deviation),
+        variance: (second - first * first).max(LEAST * deviation * deviation),
         open,
     }
 }
@@ -78,6 +81,12 @@ mod tests {
         assert!((half.mean - 1.0 / std::f64::consts::TAU.sqrt()).abs() < 1e-12);
         assert!((half.variance - (0.5 - 1.0 / std::f64::consts::TAU)).abs() < 1e-12);
         assert!((half.open - 0.5).abs() < 1e-12);
+        // Surely 0; a count more or less is no proof of the contrary.
+        let shut = cut(-9.0, 1.0, 0.0);
+        assert!(
+            shut.mean < 1e-9 && shut.variance > 0.1 && shut.open < 1e-9,
+            "{shut:?}"
+        );
     }
 
     #[test]

@@ -141,11 +141,12 @@ pub(crate) fn pooled(assessment: &Assessment, count: usize) -> (DMatrix<f64>, DV
     )
 }
 
-/// The best size of an effect that jumps: trial sizes about `start`, then ever closer ones.
+/// The best size of an effect that jumps: trial sizes about its own, then ever closer ones until they are about as good.
 pub(crate) fn hunt(evidence: &Evidence<'_>, setting: &Setting, spread: f64) -> Option<Fitted> {
-    /// Rounds at most, and log-likelihood that a round must gain for another one to follow.
+    /// Rounds at most, and log-likelihood that a round must gain, or lose on either side, for another one to follow.
     const MOST: usize = 10;
     const NOTHING: f64 = 0.5;
+    const LITTLE: f64 = 2.0;
     let at = |size: f64| -> Option<(f64, f64)> {
         let log_likelihood = evidence.likelihood(&[Setting::constant(setting.spec, [size])])?;
         Some((size, log_likelihood))
@@ -156,15 +157,18 @@ pub(crate) fn hunt(evidence: &Evidence<'_>, setting: &Setting, spread: f64) -> O
     let mut best = at(values[0])?;
     let mut spread = spread;
     for round in 0..MOST {
-        let before = best.1;
+        let (middle, before) = (best.0.min(values[0] * 4.0), best.1);
+        let mut lost: f64 = 0.0;
         for side in [-1.0, -0.5, 0.5, 1.0] {
-            let size = (best.0.min(values[0] * 4.0) + side * spread).clamp(param.low, param.high);
-            if let Some(found) = at(size).filter(|found| found.1 > best.1) {
+            let size = (middle + side * spread).clamp(param.low, param.high);
+            let Some(found) = at(size) else { continue };
+            lost = lost.max(before - found.1);
+            if found.1 > best.1 {
                 best = found;
             }
         }
         spread *= 0.4;
-        if round + 1 >= rounds(setting) && best.1 - before < NOTHING {
+        if round + 1 >= rounds(setting) && best.1 - before < NOTHING && lost < LITTLE {
             break;
         }
     }
