@@ -201,7 +201,8 @@ fn explain(search: &Search<'_>, screened: &[Screened]) -> Vec<Found> {
     let nearly_all =
         |best: &Explanation| best.share >= 1.0 - FAULTS || best.effects.len() > 1 && best.share >= ENOUGH;
     if !first_is(&found, |best| suffices(best) || nearly_all(best)) {
-        found = unless_named(found, search.unnamed());
+        let unnamed = search.unnamed(&found);
+        found = unless_named(found, unnamed);
     }
     let claimed = |best: &Explanation| verdict_of(best) != Verdict::Unexplained && !best.has_no_name();
     if let Some(best) = found.first().filter(|best| claimed(&best.explanation)) {

@@ -181,8 +181,6 @@ impl Search<'_> {
     /// come nowhere near the best are not tried to the end.
     pub(super) fn scans_beside(&self, found: &[Found]) -> Vec<Found> {
         const CLOSER: usize = 2;
-        /// Share of the best score that is near: the size beside effects that stay is not yet the best.
-        const NEAR: f64 = 0.8;
         let mut bases: Vec<Hypothesis> = Vec::new();
         for part in found.iter().flat_map(|found| &found.hypothesis.parts) {
             let spec = |part: &Part| self.atlas.probes[part.probe].spec;
@@ -207,9 +205,7 @@ impl Search<'_> {
         let starts: Vec<Hypothesis> = (hunts.iter().take(CLOSER))
             .filter_map(|(_, hunt)| self.atlas.hunted(self.simulate, self.data, hunt))
             .collect();
-        let near = found.first().map(|best| NEAR * best.explanation.score);
-        let near = near.unwrap_or(f64::NEG_INFINITY);
-        self.settle(self.descend_several(&starts, &ROUNDS_OF_SEVERAL, near))
+        self.settle(self.descend_several(&starts, &ROUNDS_OF_SEVERAL, near(found)))
     }
 
     fn jumping(&self) -> impl Iterator<Item = usize> {
@@ -325,15 +321,20 @@ impl Search<'_> {
     /// its pattern given to another of its effects: what another effect left may have suggested it.
     fn descend_several(&self, starts: &[Hypothesis], rounds: &Rounds, reached: f64) -> Vec<Descent> {
         let mut descents = self.descend(starts.iter(), rounds, reached);
-        let best = best_of(&descents);
-        let others: Vec<Hypothesis> = best.map_or_else(Vec::new, |best| {
+        if let Some(best) = best_of(&descents) {
             let plain = best.hypothesis.without_patterns(self.atlas).into_iter();
-            plain
+            let others: Vec<Hypothesis> = plain
                 .chain(best.hypothesis.with_a_pattern_less(self.atlas))
                 .chain(best.hypothesis.with_pattern_elsewhere(self.atlas))
-                .collect()
-        });
-        descents.extend(self.descend(others.iter(), rounds, reached));
+                .collect();
+            // A third effect moves the first two little: what is far behind stays there.
+            let reached = if best.hypothesis.parts.len() > 2 {
+                reached.max(best.score)
+            } else {
+                reached
+            };
+            descents.extend(self.descend(others.iter(), rounds, reached));
+        }
         descents
     }
 
@@ -375,10 +376,11 @@ impl Search<'_> {
         list
     }
 
-    /// Causes without a name: the groups of basis functions that explain most with fewest coefficients, tried to the end.
-    pub(super) fn unnamed(&self) -> Vec<Found> {
+    /// Causes without a name: the groups of basis functions that explain most with fewest coefficients, those that come near
+    /// the best found so far tried to the end.
+    pub(super) fn unnamed(&self, found: &[Found]) -> Vec<Found> {
         let starts = self.atlas.screen_groups(self.simulate, self.residual);
-        self.try_rounds(starts.iter(), &ROUNDS_OF_GROUPS)
+        self.settle(self.descend(starts.iter(), &ROUNDS_OF_GROUPS, near(found)))
     }
 
     /// An explanation with a cause without a name in place of an effect whose size is not steady but settles while a run goes
@@ -617,6 +619,12 @@ pub(super) fn candidates(
 
 /// Progress of a round, as a share of what is missing, with which a descent does not arrive.
 const SLOW: f64 = 0.1;
+
+/// A score that is near the best found: what is only begun may still come to that.
+fn near(found: &[Found]) -> f64 {
+    const NEAR: f64 = 0.8;
+    (found.first()).map_or(f64::NEG_INFINITY, |best| NEAR * best.explanation.score)
+}
 
 /// Whether the best descent leaves far too much and does not get on: more rounds would not make an answer of it.
 fn is_hopeless(descent: &Descent) -> bool {
