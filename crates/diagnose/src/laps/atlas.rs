@@ -373,22 +373,21 @@ pub(super) fn white(scatter: &[Scatter], layout: &Layout, to: &Expectation, from
 /// A difference in units of another scatter.
 pub(super) fn in_other_units(white: &White, layout: &Layout, from: &[Scatter], to: &[Scatter]) -> White {
     let mut other = white.clone();
+    let mut convert = |range: Range<usize>, units: &dyn Fn(&White) -> White| {
+        let part = white.rows(range.start, range.len()).into_owned();
+        other.rows_mut(range.start, range.len()).copy_from(&units(&part));
+    };
     let mut runs = 0;
     for (g, laps) in layout.laps.iter().enumerate() {
         let (from, to) = (&from[g], &to[g]);
-        for run in (runs..runs + laps.len()).map(|run| layout.run(run)) {
-            let part = white.rows(run.start, run.len()).into_owned();
-            let mut own = other.rows_mut(run.start, run.len());
-            own.copy_from(&to.whiten_mean(&from.unwhiten_mean(&part)));
+        for run in runs..runs + laps.len() {
+            convert(layout.run(run), &|mean| to.whiten_mean(&from.unwhiten_mean(mean)));
         }
         runs += laps.len();
-        let (trend, second) = (layout.trend(g), layout.second(g));
-        let part = white.rows(trend.start, trend.len()).into_owned();
-        let mut own = other.rows_mut(trend.start, trend.len());
-        own.copy_from(&to.whiten(&from.unwhiten(&part)));
-        let part = white.rows(second.start, second.len()).into_owned();
-        let mut own = other.rows_mut(second.start, second.len());
-        own.copy_from(&to.whiten_second(&from.unwhiten_second(&part)));
+        convert(layout.trend(g), &|trend| to.whiten(&from.unwhiten(trend)));
+        convert(layout.second(g), &|second| {
+            to.whiten_second(&from.unwhiten_second(second))
+        });
     }
     other
 }

@@ -18,9 +18,9 @@ use super::search::{Search, WEAK};
 #[derive(Debug, Clone)]
 pub(super) struct Base {
     pub(super) hypothesis: Hypothesis,
-    /// What is sought has to stand out from this: how the base's recordings scatter if it explains nearly all. A noise that does
-    /// not is too large, because it stands for what is sought too, and the declared model's scatter is the better guess.
-    scatter: Vec<Scatter>,
+    /// How the base's recordings scatter, from which what is sought has to stand out, if it explains nearly all. A noise that
+    /// does not is too large, because it stands for what is sought too: the declared model's scatter is the better guess.
+    scatter: Option<Vec<Scatter>>,
     /// What its numbers do, as orthonormal directions in units of its scatter: they follow the other effect. None if they stay.
     following: Vec<White>,
 }
@@ -37,7 +37,7 @@ impl Atlas {
     pub(super) fn at_rest(&self, hypothesis: Hypothesis) -> Base {
         Base {
             hypothesis,
-            scatter: self.scatter.clone(),
+            scatter: None,
             following: Vec::new(),
         }
     }
@@ -51,9 +51,9 @@ impl Atlas {
         let scatter = evaluated
             .filter(|evaluated| excess(&evaluated.expectation) < (1.0 - NEARLY_ALL) * excess(&self.null))
             .and_then(|evaluated| self.scatter_of(evaluated.summaries.iter(), 1));
-        let scatter = scatter.unwrap_or_else(|| self.scatter.clone());
+        let units = scatter.as_ref().unwrap_or(&self.scatter);
         Base {
-            following: self.directions(simulate, &hypothesis, &scatter),
+            following: self.directions(simulate, &hypothesis, units),
             hypothesis,
             scatter,
         }
@@ -88,14 +88,19 @@ impl Atlas {
 
     /// What an expectation leaves of the data, in units of a base's scatter, but for what the base's numbers can follow.
     pub(super) fn left_beyond(&self, data: &Expectation, base: &Base, expected: &Expectation) -> White {
-        base.beyond(white(&base.scatter, &self.layout, data, expected))
+        let scatter = base.scatter.as_ref().unwrap_or(&self.scatter);
+        base.beyond(white(scatter, &self.layout, data, expected))
     }
 
     /// Every probe in every pattern at its size that explains most of what a base leaves, but for what the base's numbers can
     /// follow, best first. What is left is given in units of the declared model's scatter.
     fn screen_beside(&self, base: &Base, left: &White) -> Vec<Screened> {
-        let beyond =
-            |white: &White| base.beyond(in_other_units(white, &self.layout, &self.scatter, &base.scatter));
+        let beyond = |white: &White| {
+            base.beyond(match &base.scatter {
+                Some(own) => in_other_units(white, &self.layout, &self.scatter, own),
+                None => white.clone(),
+            })
+        };
         self.screen_by(&beyond(left), beyond)
     }
 
