@@ -98,6 +98,50 @@ impl Effect for Warming {
     }
 }
 
+/// A wheel whose axle is not in its middle.
+static LOBED: Spec = Spec {
+    name: "lobed",
+    stage: Stage::Act,
+    summary: "the right wheel rolls faster on one side of itself",
+    params: &[Param::new("share", "", 0.0, -0.9, 0.9)],
+    list: None,
+    build: || Box::new(Lobed { turned_rad: 1.0 }),
+};
+
+#[derive(Debug)]
+struct Lobed {
+    turned_rad: f64,
+}
+
+impl Effect for Lobed {
+    fn ground(&mut self, values: &[f64], now: &Moment, wheels: WheelSpeeds) -> WheelSpeeds {
+        const RADIUS_M: f64 = 0.0205;
+        let right_m_s = wheels.right_m_s * (1.0 + values[0] * self.turned_rad.cos());
+        self.turned_rad += wheels.right_m_s * now.step_s / RADIUS_M;
+        WheelSpeeds { right_m_s, ..wheels }
+    }
+}
+
+/// A camera that does not look straight down: a share more, for each metre that the robot is off the middle to the right.
+static TILTED: Spec = Spec {
+    name: "tilted",
+    stage: Stage::Observe,
+    summary: "what is nearer to the camera is seen farther from the middle",
+    params: &[Param::new("per_m", "1/m", 0.0, -1.0, 1.0)],
+    list: None,
+    build: || Box::new(Tilted),
+};
+
+#[derive(Debug)]
+struct Tilted;
+
+impl Effect for Tilted {
+    fn observed(&self, values: &[f64], now: &Moment, position: Vec2) -> Vec2 {
+        let arm = position - now.arena_middle;
+        position + arm * (values[0] * arm.x)
+    }
+}
+
 /// The robot whose left wheel is larger.
 pub(crate) fn limping() -> Robot {
     Robot::with(Setting::constant(&LIMP, [LIMPING]))
@@ -299,6 +343,51 @@ fn a_wall_that_is_elsewhere_is_one_effect_in_logs() {
     let found = trace(&scratch, "braitenberg", "set", &[]);
     says(&found, "explained", &["inner-wall-offset"]);
     holds(&found["effects"][0], "distance_m", DISTANCE_M, 0.0);
+}
+
+/// The mean lap says nothing of it, and all in all laps scatter as with more slip.
+#[test]
+fn a_wheel_out_of_round_is_known_by_how_laps_ripple() {
+    const SHARE: f64 = 0.12;
+    share_signatures("braitenberg");
+    let scratch = Scratch::new();
+    Robot::with(Setting::constant(&LOBED, [SHARE])).record(&scratch, "set");
+    let found = trace(&scratch, "braitenberg", "set", &[]);
+    says(&found, "explained", &["unlisted"]);
+    let effect = &found["effects"][0];
+    for (key, word) in [
+        ("stage", "act"),
+        ("acts_on", "right wheel"),
+        ("depends_on", "wheel angle"),
+    ] {
+        assert_eq!(effect[key], word, "{found:#}");
+    }
+    let share = effect["coefficients"][0].as_f64().unwrap();
+    assert!((share - SHARE).abs() < 0.15 * SHARE, "{found:#}");
+}
+
+#[test]
+fn a_tilted_camera_is_known_by_its_scale_over_the_floor() {
+    const PER_M: f64 = 0.03;
+    share_signatures("braitenberg");
+    let scratch = Scratch::new();
+    Robot::with(Setting::constant(&TILTED, [PER_M])).record(&scratch, "set");
+    let found = trace(&scratch, "braitenberg", "set", &[]);
+    says(&found, "explained", &["unlisted"]);
+    let effect = &found["effects"][0];
+    for (key, word) in [
+        ("stage", "observe"),
+        ("acts_on", "camera scale"),
+        ("depends_on", "place"),
+    ] {
+        assert_eq!(effect[key], word, "{found:#}");
+    }
+    let coefficient = |i: usize| effect["coefficients"][i].as_f64().unwrap();
+    assert!((coefficient(1) - PER_M).abs() < 0.1 * PER_M, "{found:#}");
+    assert!(
+        coefficient(0) == 0.0 && coefficient(2).abs() < 0.1 * PER_M,
+        "{found:#}"
+    );
 }
 
 #[test]

@@ -124,7 +124,7 @@ impl Cause {
         let word = |i: usize| UNLISTED.params[i].choices[values[i] as usize];
         let stage = match word(0) {
             "reading" | "left-right difference" => Stage::Sense,
-            "camera x" | "camera y" => Stage::Observe,
+            "camera x" | "camera y" | "camera scale" => Stage::Observe,
             _ => Stage::Act,
         };
         Some(Self {

@@ -61,6 +61,7 @@ fn curve(trace: &Trace, coefficients: &[f64], variable: &str, label: String) -> 
     let (axis, low, high) = match variable {
         "heading" => ("heading, rad", -TAU / 2.0, TAU / 2.0),
         "gate" => ("place along the lap, rad", 0.0, TAU),
+        "wheel angle" => ("angle of the wheel, rad", 0.0, TAU),
         "time" => ("time since the run began, s", 0.0, run_s),
         "speed" => (
             "mean of the commanded speeds, m/s",

@@ -4,6 +4,8 @@ use sim::{Pattern, Setting};
 
 use super::atlas::{Atlas, Simulate};
 use super::classes::most_probable_first;
+use super::hypothesis::Hypothesis;
+use super::ripple::Ripple;
 use super::screen::Screened;
 use super::search::{Found, Search, candidates, sort};
 use super::tests_of_fit::{FourNumbers, SIGNIFICANT_P};
@@ -99,13 +101,6 @@ impl Atlas {
         let residual = self.white(&data, &self.null);
         let numbers = FourNumbers::new(&residual, &self.layout);
         let screened = self.screen(&residual);
-        let alarm = numbers.omnibus_p() < ALARM_P || self.best_score(&residual) > ALARM_SCORE;
-        if !alarm {
-            return Ok(LapDiagnosis {
-                residual: numbers,
-                answer: Answer::faithful(runs.len()),
-            });
-        }
         let search = Search {
             atlas: self,
             simulate,
@@ -113,7 +108,18 @@ impl Atlas {
             residual: &residual,
             runs,
         };
-        let mut found = explain(&search, &screened);
+        let ripple = search.ripple(&Hypothesis { parts: Vec::new() });
+        let alarm = numbers.omnibus_p() < ALARM_P || self.best_score(&residual) > ALARM_SCORE;
+        if !alarm && ripple.is_none() {
+            return Ok(LapDiagnosis {
+                residual: numbers,
+                answer: Answer::faithful(runs.len()),
+            });
+        }
+        let mut found = match ripple {
+            Some(ripple) => explain_ripple(&search, &screened, &ripple),
+            None => explain(&search, search.singles(&screened)),
+        };
         // Candidates share their draws, so that much of the error is common to them: it counts where it is large.
         let behind = ALTERNATIVE.max(2.0 * found.first().map_or(0.0, |best| best.gain_error));
         let indistinguishable = indistinguishable(found.iter().map(|found| &found.explanation), behind);
@@ -151,9 +157,44 @@ impl Atlas {
     }
 }
 
-/// Every explanation that was tried to the end, the answer first.
-fn explain(search: &Search<'_>, screened: &[Screened]) -> Vec<Found> {
-    let mut found = search.singles(screened);
+/// Every explanation of laps that ripple as with a wheel out of round, the answer first: that wheel, unless what explains the rest
+/// of the laps makes them ripple too.
+fn explain_ripple(search: &Search<'_>, screened: &[Screened], ripple: &Ripple) -> Vec<Found> {
+    let nothing = Hypothesis { parts: Vec::new() };
+    let wheel = search.out_of_round(&nothing, ripple);
+    let singles = search.singles(screened);
+    let rival = singles.first().map_or(0.0, |best| best.explanation.score);
+    if first_is(&wheel, |wheel| {
+        leaves_nothing_to_ask(wheel) && wheel.score > rival
+    }) {
+        return with_first(true, wheel, singles);
+    }
+    let found = explain(search, singles);
+    let Some(best) = found.first() else {
+        return wheel;
+    };
+    let Some(ripple) = search.ripple(&best.hypothesis) else {
+        return found;
+    };
+    // Noise may have stood for the wheel.
+    let quiet = search.without_noise(&best.hypothesis);
+    let mut beside = search.out_of_round(&best.hypothesis, &ripple);
+    if !quiet.parts.is_empty() && quiet.parts.len() < best.hypothesis.parts.len() {
+        beside.extend(search.out_of_round(&quiet, &ripple));
+    }
+    beside.extend(wheel);
+    sort(&mut beside);
+    unless_steady(found, beside)
+}
+
+/// Every explanation that was tried to the end, the answer first; `found` are those by single effects.
+fn explain(search: &Search<'_>, mut found: Vec<Found>) -> Vec<Found> {
+    if !first_is(&found, leaves_nothing_to_ask) {
+        let tilted = search.tilted(&found);
+        if first_is(&tilted, leaves_nothing_to_ask) {
+            return with_first(true, tilted, found);
+        }
+    }
     // Of an effect that jumps a descent finds the nearest good size, not the best.
     let jumps = found.first().is_some_and(|best| search.jumped(best));
     if !first_is(&found, |best| {
@@ -170,11 +211,9 @@ fn explain(search: &Search<'_>, screened: &[Screened]) -> Vec<Found> {
     sort(&mut found);
     let leaves_next_to_nothing = |best: &Explanation| best.share >= ENOUGH && !goes_over_runs_or_time(best);
     let pairs = match found.first() {
-        Some(best) if stands_alone(&best.explanation) => {
-            search.pairs_with(best, true, faults_beside(&best.explanation))
-        }
-        Some(best) if leaves_next_to_nothing(&best.explanation) => {
-            search.pairs_with(best, false, faults_beside(&best.explanation))
+        Some(best) if stands_alone(&best.explanation) || leaves_next_to_nothing(&best.explanation) => {
+            let (stands, faults) = (stands_alone(&best.explanation), faults_beside(&best.explanation));
+            search.pairs_with(best, stands, faults)
         }
         _ => search.pairs(&found),
     };
@@ -256,9 +295,13 @@ fn heaps_noise(explanation: &Explanation) -> bool {
 
 /// The number of effects on noise.
 fn noises(explanation: &Explanation) -> usize {
-    const NOISE: [&str; 4] = ["slip-level", "slip-memory", "reading-noise", "camera-noise"];
     let names = explanation.names();
-    names.iter().filter(|name| NOISE.contains(name)).count()
+    names.iter().filter(|name| is_noise(name)).count()
+}
+
+/// Whether an effect changes nothing but chance.
+pub(super) fn is_noise(name: &str) -> bool {
+    ["slip-level", "slip-memory", "reading-noise", "camera-noise"].contains(&name)
 }
 
 /// More effects come before fewer only if each number of the further ones gains enough, and if they fit where the fewer do

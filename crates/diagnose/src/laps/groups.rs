@@ -29,6 +29,10 @@ pub(super) fn groups() -> Vec<Probe> {
         }
         probes.extend(group(target, ["time", SETTLING], &[1.0, 1.0], 0));
     }
+    probes.extend(group(("camera scale", 0.004), TILT, &[1.0, 2.0, 2.0], 1));
+    for wheel in ["wheel speed", "left wheel", "right wheel"] {
+        probes.extend(group((wheel, 0.02), [WHEEL_ANGLE, "harmonics"], &[1.0], 0));
+    }
     probes
 }
 
@@ -54,6 +58,12 @@ fn group(
 
 /// The basis of what settles while a run goes on. Only what was seen to settle is tried with it.
 const SETTLING: &str = "settling";
+
+/// The angle of a wheel. Only what was seen to ripple is tried with it.
+const WHEEL_ANGLE: &str = "wheel angle";
+
+/// What a camera's scale depends on that looks at the floor at an angle: in its words, two numbers.
+const TILT: [&str; 2] = ["place", "polynomial"];
 
 /// What a cause may act on, with a step over which its action is about linear: rad/s, a share, m/s, counts, m.
 const TARGETS: [(&str, f64); 7] = [
@@ -81,10 +91,28 @@ const DEPENDENCES: [(&str, &str, &[f64]); 5] = [
 ];
 
 impl Probe {
+    /// Whether it is no group that is screened with the others.
+    fn is_tried_apart(&self) -> bool {
+        self.settles() || self.turns() || self.tilts()
+    }
+
     /// Whether it is a group of what settles while a run goes on.
     fn settles(&self) -> bool {
-        let basis = || self.spec.params[2].choices[self.origin()[2] as usize];
-        *self.spec == UNLISTED && basis() == SETTLING
+        self.is_group_with(2, SETTLING)
+    }
+
+    /// Whether it is a group of what turns with a wheel.
+    pub(super) fn turns(&self) -> bool {
+        self.is_group_with(1, WHEEL_ANGLE)
+    }
+
+    /// Whether it is the group of a tilted camera.
+    fn tilts(&self) -> bool {
+        self.is_group_with(0, "camera scale")
+    }
+
+    fn is_group_with(&self, choice: usize, word: &str) -> bool {
+        *self.spec == UNLISTED && self.spec.params[choice].choices[self.origin()[choice] as usize] == word
     }
 }
 
@@ -94,25 +122,10 @@ impl Atlas {
     pub(super) fn screen_groups(&self, simulate: &Simulate<'_>, residual: &White) -> Vec<Hypothesis> {
         const MOST: usize = 3;
         let all: Vec<usize> = (0..self.probes.len())
-            .filter(|&probe| *self.probes[probe].spec == UNLISTED && !self.probes[probe].settles())
+            .filter(|&probe| *self.probes[probe].spec == UNLISTED)
+            .filter(|&probe| !self.probes[probe].is_tried_apart())
             .collect();
-        let jobs: Vec<(usize, usize)> = (all.iter())
-            .flat_map(|&probe| (0..self.probes[probe].free.len()).map(move |i| (probe, i)))
-            .collect();
-        let actions = self.actions(simulate, &jobs, GROUP_SETS);
-        let mut found: Vec<(f64, usize, Hypothesis)> = (all.iter())
-            .map(|&probe| {
-                let columns: Vec<&White> = (jobs.iter().zip(&actions))
-                    .filter(|((p, _), action)| *p == probe && action.is_some())
-                    .filter_map(|(_, action)| action.as_ref())
-                    .collect();
-                let (multiples, gain) = solve(&columns, residual);
-                let count = columns.len();
-                let part = Part::group(&self.probes[probe], probe, multiples.as_slice());
-                let score = gain - price(count, self.layout.total_laps());
-                (score, count, Hypothesis::of(part))
-            })
-            .collect();
+        let mut found = self.fitted_groups(simulate, residual, &all);
         let most = found.iter().map(|f| f.0).fold(0.0, f64::max);
         // The best stand first; among those that are as good, the shorter.
         found.sort_by(|a, b| {
@@ -127,6 +140,41 @@ impl Atlas {
             .filter(|f| f.0 > 0.3 * most)
             .map(|f| f.2)
             .collect()
+    }
+
+    /// A camera that looks at the floor at an angle, as far as that explains a residual, with the score that linear algebra gives
+    /// it.
+    pub(super) fn screen_tilt(&self, simulate: &Simulate<'_>, residual: &White) -> Option<(f64, Hypothesis)> {
+        let tilts: Vec<usize> = (0..self.probes.len())
+            .filter(|&probe| self.probes[probe].tilts())
+            .collect();
+        let (score, _, tilt) = self.fitted_groups(simulate, residual, &tilts).pop()?;
+        Some((score, tilt))
+    }
+
+    /// Groups at the sizes that linear algebra gives them, each with its score and number of coefficients.
+    fn fitted_groups(
+        &self,
+        simulate: &Simulate<'_>,
+        residual: &White,
+        groups: &[usize],
+    ) -> Vec<(f64, usize, Hypothesis)> {
+        let jobs: Vec<(usize, usize)> = (groups.iter())
+            .flat_map(|&probe| (0..self.probes[probe].free.len()).map(move |i| (probe, i)))
+            .collect();
+        let actions = self.actions(simulate, &jobs, GROUP_SETS);
+        let fitted = |&probe: &usize| {
+            let columns: Vec<&White> = (jobs.iter().zip(&actions))
+                .filter(|((p, _), action)| *p == probe && action.is_some())
+                .filter_map(|(_, action)| action.as_ref())
+                .collect();
+            let (multiples, gain) = solve(&columns, residual);
+            let count = columns.len();
+            let part = Part::group(&self.probes[probe], probe, multiples.as_slice());
+            let score = gain - price(count, self.layout.total_laps());
+            (score, count, Hypothesis::of(part))
+        };
+        groups.iter().map(fitted).collect()
     }
 
     /// What settles like this and explains a residual best at the sizes that linear algebra gives, target by target.

@@ -18,6 +18,7 @@ mod pairs;
 mod parabola;
 mod probe;
 mod refine;
+mod ripple;
 mod screen;
 mod search;
 mod separation;

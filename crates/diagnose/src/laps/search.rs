@@ -7,10 +7,12 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use super::atlas::{Atlas, Simulate, White};
+use super::diagnosis::is_noise;
 use super::expectation::Expectation;
 use super::hunt::Hunt;
 use super::hypothesis::{Freedom, Hypothesis, Part, Shape};
 use super::refine::{CLOSE_SETS, Descent, Round, Settled};
+use super::ripple::Ripple;
 use super::screen::Screened;
 use super::simulated::FINAL_SETS;
 use super::tests_of_fit::{FourNumbers, HOPELESS_P, Quadratic, SIGNIFICANT_P};
@@ -383,6 +385,14 @@ impl Search<'_> {
         self.settle(self.descend(starts.iter(), &ROUNDS_OF_GROUPS, near(found)))
     }
 
+    /// A camera that looks at the floor at an angle, tried to the end if it may explain more than the best found so far.
+    pub(super) fn tilted(&self, found: &[Found]) -> Vec<Found> {
+        let best = found.first().map_or(0.0, |best| best.explanation.score);
+        let tilt = self.atlas.screen_tilt(self.simulate, self.residual);
+        let start = tilt.filter(|(score, _)| *score > best).map(|(_, start)| start);
+        self.try_rounds(start.iter(), &ROUNDS_OF_GROUPS)
+    }
+
     /// An explanation with a cause without a name in place of an effect whose size is not steady but settles while a run goes
     /// on, tried to the end.
     pub(super) fn settling(&self, best: &Found) -> Vec<Found> {
@@ -409,6 +419,29 @@ impl Search<'_> {
             .map(|start| others.with(start))
             .collect();
         self.try_rounds(starts.iter(), &ROUNDS_OF_GROUPS)
+    }
+
+    /// The wheel that laps ripple with as if it were out of round, beside some effects, if that is not chance.
+    pub(super) fn ripple(&self, others: &Hypothesis) -> Option<Ripple> {
+        /// Probability below which it is not.
+        const NO_CHANCE_P: f64 = 1e-5;
+        let ripple = self.atlas.ripple(self.simulate, self.runs, others);
+        ripple.filter(|ripple| ripple.p() < NO_CHANCE_P)
+    }
+
+    /// The effects of a hypothesis that change more than chance.
+    pub(super) fn without_noise(&self, hypothesis: &Hypothesis) -> Hypothesis {
+        let mut others = hypothesis.clone();
+        others
+            .parts
+            .retain(|part| !is_noise(self.atlas.probes[part.probe].spec.name));
+        others
+    }
+
+    /// Effects with a wheel that is out of round, tried to the end.
+    pub(super) fn out_of_round(&self, others: &Hypothesis, ripple: &Ripple) -> Vec<Found> {
+        let start = others.with(&ripple.hypothesis(self.atlas));
+        self.try_rounds(std::iter::once(&start), &ROUNDS_OF_GROUPS)
     }
 
     /// Descends from every hypothesis and settles those that may be the best.

@@ -133,25 +133,22 @@ fn summarise(laps: &[DVector<f64>]) -> RunSummary {
 fn second_order(runs: &[Vec<DVector<f64>>]) -> DVector<f64> {
     let size = runs[0][0].len();
     let gates = size - BLOCKS;
-    let (mut squares, mut freedom) = (DVector::<f64>::zeros(size), 0.0);
+    let mut squares = DVector::<f64>::zeros(size);
     let (mut bends, mut rough5) = (Vec::new(), Moments::default());
     let mut durations = Moments::default();
-    for quarter in runs.iter().flat_map(|laps| quarters(laps)) {
-        let mean = quarter.iter().sum::<DVector<f64>>() / quarter.len() as f64;
-        freedom += quarter.len() as f64 - 1.0;
-        for lap in quarter {
-            let deviation = lap - &mean;
-            squares += deviation.component_mul(&deviation);
-            bends.extend((1..gates - 1).map(|g| deviation[g - 1] - 2.0 * deviation[g] + deviation[g + 1]));
-            for g in 5..gates.saturating_sub(5) {
-                rough5.add(deviation[g - 5] - 2.0 * deviation[g] + deviation[g + 5]);
-            }
-            deviation
-                .rows(gates, BLOCKS)
-                .iter()
-                .for_each(|&d| durations.add(d));
+    for deviation in deviations(runs) {
+        squares += deviation.component_mul(&deviation);
+        bends.extend((1..gates - 1).map(|g| deviation[g - 1] - 2.0 * deviation[g] + deviation[g + 1]));
+        for g in 5..gates.saturating_sub(5) {
+            rough5.add(deviation[g - 5] - 2.0 * deviation[g] + deviation[g + 5]);
         }
+        deviation
+            .rows(gates, BLOCKS)
+            .iter()
+            .for_each(|&d| durations.add(d));
     }
+    let freedom = |laps: &Vec<DVector<f64>>| laps.len() - quarters(laps).count();
+    let freedom = runs.iter().map(freedom).sum::<usize>() as f64;
     let variances = stretches(size)
         .map(|part| (squares.rows(part.start, part.len()).sum() / freedom / part.len() as f64).ln());
     let others = [
@@ -170,6 +167,15 @@ fn stretches(size: usize) -> impl Iterator<Item = Range<usize>> {
     let of_gates = (0..10).map(move |b| b * gates / 10..(b + 1) * gates / 10);
     let of_durations = (0..5).map(move |b| gates + 4 * b..gates + 4 * (b + 1));
     of_gates.chain(of_durations)
+}
+
+/// How the laps' vectors deviate from the means of their run's quarters.
+pub(super) fn deviations(runs: &[Vec<DVector<f64>>]) -> impl Iterator<Item = DVector<f64>> {
+    let quarters = runs.iter().flat_map(|laps| quarters(laps));
+    quarters.flat_map(|quarter| {
+        let mean = quarter.iter().sum::<DVector<f64>>() / quarter.len() as f64;
+        quarter.iter().map(move |lap| lap - &mean)
+    })
 }
 
 /// A run's laps in four parts of about the same length, of two laps at least.

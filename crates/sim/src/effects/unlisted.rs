@@ -5,7 +5,7 @@ use track::Vec2;
 use super::{Effect, Moment, Param, Spec, Stage};
 use crate::{Machine, Readings, Twist, WheelSpeeds};
 
-const ACTS_ON: [&str; 9] = [
+const ACTS_ON: [&str; 10] = [
     "yaw rate",
     "wheel speed",
     "left wheel",
@@ -15,21 +15,35 @@ const ACTS_ON: [&str; 9] = [
     "left-right difference",
     "camera x",
     "camera y",
+    "camera scale",
 ];
-const DEPENDS_ON: [&str; 7] = ["constant", "heading", "gate", "place", "speed", "turn", "time"];
+const DEPENDS_ON: [&str; 8] = [
+    "constant",
+    "heading",
+    "gate",
+    "place",
+    "speed",
+    "turn",
+    "time",
+    "wheel angle",
+];
 const BASES: [&str; 3] = ["polynomial", "harmonics", "settling"];
 
 /// Values before the coefficients.
 const WORDS: usize = 3;
 
+/// Radius of the e-puck's wheels, m.
+const WHEEL_RADIUS_M: f64 = 0.0205;
+
 /// An effect outside the list: a sum over basis functions of one variable.
 ///
 /// What the sum is: rad/s added to the yaw rate; m/s added to the robot's velocity to its left; a share added to
 /// wheel speeds or to all readings; counts added to the difference of the left and the right three readings that
-/// controllers look at; m added to what the camera sees.
+/// controllers look at; m added to what the camera sees; a share added to how far from the arena's middle it sees the robot.
 ///
 /// The variable u is 1 (constant), the heading (rad), the lap's fraction by gates times 2 pi (rad), the mean of the
-/// commanded wheel speeds or their difference, right less left (m/s), or the time since the run began (s). The
+/// commanded wheel speeds or their difference, right less left (m/s), the time since the run began (s), or the angle by which
+/// wheels have turned since then (rad): each wheel's own, for what is no wheel both in the mean. The
 /// polynomial is c0 + c1 u + c2 u^2 + ..., the harmonics c0 cos u + c1 sin u + c2 cos 2u + c3 sin 2u + ..., the settling
 /// c0 + c1 exp(-u / c2). A place on the floor has two coordinates (x, y) from the arena's middle (m), and for it any basis
 /// stands for the monomials 1, x, y, x^2, xy, y^2, ....
@@ -45,11 +59,21 @@ pub static UNLISTED: Spec = Spec {
         Param::choice("basis", &BASES),
     ],
     list: Some(Param::new("coefficients", "", 0.0, -1e6, 1e6)),
-    build: || Box::new(Unlisted),
+    build: || Box::<Unlisted>::default(),
 };
 
-#[derive(Debug)]
-struct Unlisted;
+/// The angles by which the wheels have turned.
+#[derive(Debug, Default)]
+struct Unlisted {
+    left_rad: f64,
+    right_rad: f64,
+}
+
+impl Unlisted {
+    fn mean_rad(&self) -> f64 {
+        0.5 * (self.left_rad + self.right_rad)
+    }
+}
 
 /// The word that a value of a choice stands for.
 fn word(names: &'static [&'static str], value: f64) -> &'static str {
@@ -57,7 +81,7 @@ fn word(names: &'static [&'static str], value: f64) -> &'static str {
 }
 
 /// The sum over the basis, if the effect acts on one of the targets.
-fn amount(values: &[f64], now: &Moment, targets: &[&str]) -> Option<f64> {
+fn amount(values: &[f64], now: &Moment, wheel_rad: f64, targets: &[&str]) -> Option<f64> {
     if !targets.contains(&word(&ACTS_ON, values[0])) {
         return None;
     }
@@ -69,6 +93,7 @@ fn amount(values: &[f64], now: &Moment, targets: &[&str]) -> Option<f64> {
         "speed" => 0.5 * (command.left_m_s + command.right_m_s),
         "turn" => command.right_m_s - command.left_m_s,
         "time" => now.time_s,
+        "wheel angle" => wheel_rad,
         _ => return Some(coefficients.iter().sum()),
     };
     Some(unlisted_at(values, u))
@@ -123,10 +148,10 @@ fn on_floor(coefficients: &[f64], at: Vec2) -> f64 {
 
 impl Effect for Unlisted {
     fn readings(&mut self, values: &[f64], now: &Moment, _machine: &Machine, readings: &mut Readings) {
-        if let Some(share) = amount(values, now, &["reading"]) {
+        if let Some(share) = amount(values, now, self.mean_rad(), &["reading"]) {
             readings.iter_mut().for_each(|reading| *reading *= 1.0 + share);
         }
-        if let Some(counts) = amount(values, now, &["left-right difference"]) {
+        if let Some(counts) = amount(values, now, self.mean_rad(), &["left-right difference"]) {
             for (left, right) in [(5, 2), (6, 1), (7, 0)] {
                 readings[left] += counts / 6.0;
                 readings[right] -= counts / 6.0;
@@ -135,15 +160,19 @@ impl Effect for Unlisted {
     }
 
     fn ground(&mut self, values: &[f64], now: &Moment, wheels: WheelSpeeds) -> WheelSpeeds {
-        let factor = |wheel| 1.0 + amount(values, now, &["wheel speed", wheel]).unwrap_or(0.0);
-        WheelSpeeds {
-            left_m_s: wheels.left_m_s * factor("left wheel"),
-            right_m_s: wheels.right_m_s * factor("right wheel"),
-        }
+        let factor =
+            |wheel_rad, wheel| 1.0 + amount(values, now, wheel_rad, &["wheel speed", wheel]).unwrap_or(0.0);
+        let ground = WheelSpeeds {
+            left_m_s: wheels.left_m_s * factor(self.left_rad, "left wheel"),
+            right_m_s: wheels.right_m_s * factor(self.right_rad, "right wheel"),
+        };
+        self.left_rad += wheels.left_m_s * now.step_s / WHEEL_RADIUS_M;
+        self.right_rad += wheels.right_m_s * now.step_s / WHEEL_RADIUS_M;
+        ground
     }
 
     fn twist(&mut self, values: &[f64], now: &Moment, twist: Twist) -> Twist {
-        let more_rad_s = amount(values, now, &["yaw rate"]).unwrap_or(0.0);
+        let more_rad_s = amount(values, now, self.mean_rad(), &["yaw rate"]).unwrap_or(0.0);
         Twist {
             yaw_rad_s: twist.yaw_rad_s + more_rad_s,
             ..twist
@@ -151,12 +180,13 @@ impl Effect for Unlisted {
     }
 
     fn drift_m_s(&self, values: &[f64], now: &Moment) -> Vec2 {
-        let left_m_s = amount(values, now, &["side slip"]).unwrap_or(0.0);
+        let left_m_s = amount(values, now, self.mean_rad(), &["side slip"]).unwrap_or(0.0);
         now.pose.heading.perp() * left_m_s
     }
 
     fn observed(&self, values: &[f64], now: &Moment, position: Vec2) -> Vec2 {
-        let along = |axis| amount(values, now, &[axis]).unwrap_or(0.0);
-        position + Vec2::new(along("camera x"), along("camera y"))
+        let along = |axis| amount(values, now, self.mean_rad(), &[axis]).unwrap_or(0.0);
+        let farther = along("camera scale");
+        position + Vec2::new(along("camera x"), along("camera y")) + (position - now.arena_middle) * farther
     }
 }

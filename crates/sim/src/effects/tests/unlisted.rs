@@ -53,6 +53,29 @@ fn wheel_speed_by_the_heading_twice_per_turn() {
     }
 }
 
+/// Each wheel by its own angle: a quarter of a turn of the left one is `PI / 2 * 20.5 mm`.
+#[test]
+fn a_wheel_out_of_round_by_its_own_angle() {
+    let speeds = |left_m_s, right_m_s| WheelSpeeds { left_m_s, right_m_s };
+    let now = moment(Pose::new(0.0, 0.0, 0.0), 0.0, 0.5);
+    let quarter_m_s = std::f64::consts::FRAC_PI_2 * 0.0205 / 0.5;
+    let after_a_quarter = |target: &str| {
+        let words = [target, "wheel angle", "harmonics"];
+        let mut wheel = active("unlisted", &values(words, &[0.1, 0.03]));
+        let mut ground = |wheels| wheel.effect.ground(&wheel.values, &now, wheels);
+        let first = ground(speeds(quarter_m_s, 0.0));
+        let of_left = if target == "right wheel" { 1.0 } else { 1.1 };
+        assert!((first.left_m_s - of_left * quarter_m_s).abs() < 1e-15);
+        ground(speeds(1.0, 1.0))
+    };
+    let both = after_a_quarter("wheel speed");
+    assert!((both.left_m_s - 1.03).abs() < 1e-15 && (both.right_m_s - 1.1).abs() < 1e-15);
+    let left = after_a_quarter("left wheel");
+    assert!((left.left_m_s - 1.03).abs() < 1e-15 && left.right_m_s == 1.0);
+    let right = after_a_quarter("right wheel");
+    assert!(right.left_m_s == 1.0 && (right.right_m_s - 1.1).abs() < 1e-15);
+}
+
 #[test]
 fn camera_polynomial_over_the_floor() {
     let camera = active(
@@ -69,6 +92,20 @@ fn camera_polynomial_over_the_floor() {
     let (x, y) = (0.2, 0.1);
     let expected = 0.7 + 1.0 + 2.0 * x + 3.0 * y + 4.0 * x * x + 5.0 * x * y + 6.0 * y * y;
     assert!((seen - Vec2::new(0.9, expected)).length() < 1e-12, "{seen:?}");
+}
+
+/// A camera that looks at the floor at an angle sees what is nearer to it larger.
+#[test]
+fn a_tilted_camera_scales_by_the_place() {
+    let words = ["camera scale", "place", "polynomial"];
+    let camera = active("unlisted", &values(words, &[0.0, 0.3, -0.1]));
+    let (pose, p) = (Pose::new(0.9, 0.7, 0.0), Vec2::new(0.9, 0.7));
+    let now = moment(pose, 0.0, 0.064);
+    let seen = camera.effect.observed(&camera.values, &now, p);
+    let (x, y) = (0.2, 0.1);
+    let share = 0.3 * x - 0.1 * y;
+    let expected = Vec2::new(0.9 + share * x, 0.7 + share * y);
+    assert!((seen - expected).length() < 1e-12, "{seen:?}");
 }
 
 #[test]
@@ -130,6 +167,12 @@ fn constants_are_the_listed_effects() {
         1.25,
     );
     same(["reading", "constant", "harmonics"], 0.25, "reading-gain", 1.25);
+    same(
+        ["camera scale", "constant", "polynomial"],
+        0.25,
+        "camera-scale",
+        1.25,
+    );
 }
 
 #[test]
@@ -148,6 +191,12 @@ fn no_coefficients_change_nothing() {
                 &declared(),
                 "unlisted",
                 &values([target, "turn", "polynomial"], zeros),
+            );
+            assert!(steps(&model, 0, 1, 100) == plain, "{target}");
+            let model = with(
+                &declared(),
+                "unlisted",
+                &values([target, "wheel angle", "harmonics"], zeros),
             );
             assert!(steps(&model, 0, 1, 100) == plain, "{target}");
         }

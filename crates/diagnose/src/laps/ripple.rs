@@ -1,0 +1,220 @@
+//! Whether laps ripple along the track as they do with a wheel that is out of round.
+//!
+//! What turns with a wheel has another phase in every lap. It leaves nothing in the mean lap, and little in how laps scatter all
+//! in all, but lines in the spectrum of what is left, where a wheel's turns per lap are.
+
+use std::f64::consts::TAU;
+
+use nalgebra::DVector;
+use rayon::prelude::*;
+use track::Lap;
+
+use super::atlas::{Atlas, Simulate};
+use super::hypothesis::{Hypothesis, Part};
+use super::summary::{BLOCKS, deviations, lap_vector};
+use super::tests_of_fit::Quadratic;
+
+/// Data sets simulated of what is expected.
+const SETS: u64 = 24;
+
+/// Data sets simulated with each wheel out of round beside it, and the share by which it then is.
+const WHEEL_SETS: u64 = 8;
+const WHEEL_SHARE: f64 = 0.12;
+
+/// Shares that are compared with the data: from this on, each larger by a factor.
+const SMALLEST_SHARE: f64 = 0.01;
+const FACTOR: f64 = 1.1;
+const SHARES: i32 = 40;
+
+/// Cycles per lap from which on lines are looked for: longer waves are what a controller makes of any disturbance.
+const LEAST_CYCLES: usize = 10;
+
+/// Frequencies to either side of one of which the median is the ground that a line stands out from.
+const GROUND: usize = 8;
+
+/// The wheel that laps ripple with as if it were out of round.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Ripple {
+    /// Its probe.
+    probe: usize,
+    /// How much it is out of round: a share of its speed.
+    share: f64,
+    /// How many standard deviations laps have of its lines.
+    sigmas: f64,
+    /// Number of probes among which it is the best.
+    tried: usize,
+}
+
+impl Ripple {
+    /// Probability that chance makes as much of any of the wheels' lines (Bonferroni).
+    pub(super) fn p(&self) -> f64 {
+        let one_sided = if self.sigmas > 0.0 {
+            0.5 * Quadratic::new(self.sigmas.powi(2), 1).p
+        } else {
+            1.0
+        };
+        (self.tried as f64 * one_sided).min(1.0)
+    }
+
+    /// The wheel as an effect.
+    pub(super) fn hypothesis(&self, atlas: &Atlas) -> Hypothesis {
+        wheel(atlas, self.probe, self.share)
+    }
+}
+
+fn wheel(atlas: &Atlas, probe: usize, share: f64) -> Hypothesis {
+    let of_wheel = &atlas.probes[probe];
+    Hypothesis::of(Part::group(of_wheel, probe, &[share / of_wheel.free[0].1]))
+}
+
+impl Atlas {
+    /// The wheel whose lines measured laps have most of, beside what some effects make of them; `None` where the robot crashes.
+    pub(super) fn ripple(
+        &self,
+        simulate: &Simulate<'_>,
+        runs: &[Vec<Lap>],
+        others: &Hypothesis,
+    ) -> Option<Ripple> {
+        let expected = self.spectra(simulate, others, SETS)?;
+        let mean = mean(&expected);
+        let missing = lines(&(spectrum(runs) - &mean));
+        let scatters: Vec<DVector<f64>> = (expected.iter())
+            .map(|spectrum| lines(&(spectrum - &mean)))
+            .collect();
+        let freedom = scatters.len() as f64 - 1.0;
+        // The mean of the simulated spectra has an error too.
+        let variance_of = |squares: f64| squares / freedom * (1.0 + 1.0 / scatters.len() as f64);
+        let of_each = variance_of(scatters.iter().map(DVector::norm_squared).sum()) / missing.len() as f64;
+        let probes: Vec<usize> = (0..self.probes.len())
+            .filter(|&probe| self.probes[probe].turns())
+            .collect();
+        let ripple = |&probe: &usize| {
+            let with = others.with(&wheel(self, probe, WHEEL_SHARE));
+            let more = self::mean(&self.spectra(simulate, &with, WHEEL_SETS)?) - &mean;
+            let direction = lines(&more).try_normalize(f64::MIN_POSITIVE)?;
+            // Lines that lie side by side scatter together.
+            let along = scatters
+                .iter()
+                .map(|scatter| scatter.dot(&direction).powi(2))
+                .sum();
+            let sigma = of_each.max(variance_of(along)).sqrt();
+            let power = more.map(|ln| ln.exp_m1().max(0.0) / WHEEL_SHARE.powi(2));
+            let misfit = |share: f64| {
+                (lines(&power.map(|power| (share.powi(2) * power).ln_1p())) - &missing).norm_squared()
+            };
+            let share = (0..SHARES)
+                .map(|k| SMALLEST_SHARE * FACTOR.powi(k))
+                .min_by(|a, b| misfit(*a).total_cmp(&misfit(*b)))?;
+            Some(Ripple {
+                probe,
+                share,
+                sigmas: missing.dot(&direction) / sigma,
+                tried: probes.len(),
+            })
+        };
+        (probes.iter().filter_map(ripple)).max_by(|a, b| a.sigmas.total_cmp(&b.sigmas))
+    }
+
+    fn spectra(
+        &self,
+        simulate: &Simulate<'_>,
+        hypothesis: &Hypothesis,
+        sets: u64,
+    ) -> Option<Vec<DVector<f64>>> {
+        let settings = hypothesis.settings(self);
+        self.spent.add(sets);
+        (0..sets)
+            .into_par_iter()
+            .map(|set| simulate(&settings, set).map(|runs| spectrum(&runs)))
+            .collect()
+    }
+}
+
+fn mean(spectra: &[DVector<f64>]) -> DVector<f64> {
+    spectra.iter().sum::<DVector<f64>>() / spectra.len() as f64
+}
+
+/// Log power of how laps deviate sideways from the means of their run's quarters, from [`LEAST_CYCLES`] cycles per lap to one in
+/// two gates.
+fn spectrum(runs: &[Vec<Lap>]) -> DVector<f64> {
+    let vectors: Vec<Vec<DVector<f64>>> = (runs.iter())
+        .map(|laps| laps.iter().map(lap_vector).collect())
+        .collect();
+    let deviations: Vec<DVector<f64>> = deviations(&vectors).collect();
+    let gates = deviations.first().map_or(0, |lap| lap.len() - BLOCKS);
+    let power = |cycles: usize| {
+        let turn = TAU * cycles as f64 / gates as f64;
+        let cos = DVector::from_fn(gates, |gate, _| (turn * gate as f64).cos());
+        let sin = DVector::from_fn(gates, |gate, _| (turn * gate as f64).sin());
+        let of_lap = |lap: &DVector<f64>| {
+            let positions_mm = lap.rows(0, gates);
+            positions_mm.dot(&cos).powi(2) + positions_mm.dot(&sin).powi(2)
+        };
+        let power: f64 = deviations.iter().map(of_lap).sum();
+        power.max(f64::MIN_POSITIVE).ln()
+    };
+    let powers: Vec<f64> = (LEAST_CYCLES..=gates / 2).map(power).collect();
+    DVector::from_vec(powers)
+}
+
+/// How much each of a spectrum's numbers is above the median of those about it.
+fn lines(spectrum: &DVector<f64>) -> DVector<f64> {
+    let values = spectrum.as_slice();
+    let above = |at: usize| {
+        let about = at.saturating_sub(GROUND)..(at + GROUND + 1).min(values.len());
+        let mut others: Vec<f64> = about.filter(|&k| k != at).map(|k| values[k]).collect();
+        others.sort_by(f64::total_cmp);
+        let (low, high) = match others.len() {
+            0 => return 0.0,
+            n => (others[(n - 1) / 2], others[n / 2]),
+        };
+        values[at] - 0.5 * (low + high)
+    };
+    DVector::from_iterator(values.len(), (0..values.len()).map(above))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Laps of 100 gates, each a wave with a phase of its own.
+    fn waves(cycles: f64, amplitude_m: f64) -> Vec<Vec<Lap>> {
+        let lap = |number: usize| Lap {
+            start_s: 70.0 * number as f64,
+            end_s: 70.0 * (number + 1) as f64,
+            times_s: (0..100)
+                .map(|gate| 70.0 * number as f64 + 0.7 * f64::from(gate))
+                .collect(),
+            offsets_m: (0..100)
+                .map(|gate| {
+                    let phase = TAU * (0.25 * number as f64 + cycles * f64::from(gate) / 100.0);
+                    amplitude_m * phase.sin()
+                })
+                .collect(),
+            missed: Vec::new(),
+        };
+        vec![(0..16).map(lap).collect()]
+    }
+
+    #[test]
+    fn the_power_of_a_wave_is_at_its_frequency() {
+        let spectrum = spectrum(&waves(24.0, 0.002));
+        assert_eq!(spectrum.len(), 41);
+        // Four laps a quarter of a turn apart have a mean of zero; each has (amplitude x gates / 2)^2.
+        let expected = (16.0 * 100.0_f64.powi(2)).ln();
+        assert!(
+            (spectrum[24 - LEAST_CYCLES] - expected).abs() < 1e-9,
+            "{spectrum}"
+        );
+        assert!(spectrum[30 - LEAST_CYCLES] < expected - 20.0);
+    }
+
+    #[test]
+    fn lines_stand_out_from_a_slope() {
+        let mut spectrum = DVector::from_fn(41, |k, _| 5.0 - 0.1 * k as f64);
+        spectrum[20] += 2.0;
+        let lines = lines(&spectrum);
+        assert!((lines[20] - 2.0).abs() < 1e-12);
+        assert!((9..32).filter(|&k| k != 20).all(|k| lines[k].abs() < 0.151));
+    }
+}
