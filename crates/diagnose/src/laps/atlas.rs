@@ -47,13 +47,17 @@ pub struct Atlas {
     pub(super) spent: Spent,
 }
 
-/// A count of the data sets that were simulated for a diagnosis.
+/// A count of the data sets that a diagnosis asked for.
 #[derive(Debug, Default)]
 pub(super) struct Spent(AtomicU64);
 
 impl Spent {
-    pub(super) fn add(&self, sets: u64) {
-        self.0.fetch_add(sets, Ordering::Relaxed);
+    pub(super) fn add_one(&self) {
+        self.0.fetch_add(1, Ordering::Relaxed);
+    }
+
+    pub(super) fn count(&self) -> u64 {
+        self.0.load(Ordering::Relaxed)
     }
 }
 
@@ -242,9 +246,9 @@ impl Atlas {
         NULL_SETS + CUT_SETS * cuts as u64
     }
 
-    /// Number of data sets simulated for diagnoses, the atlas itself not counted.
+    /// Number of data sets that diagnoses asked for, the atlas itself not counted.
     pub fn spent(&self) -> u64 {
-        self.spent.0.load(Ordering::Relaxed)
+        self.spent.count()
     }
 
     /// The mean of some of the data sets simulated of the declared model.

@@ -5,6 +5,7 @@ use sim::{Pattern, Setting};
 use super::atlas::{Atlas, Simulate};
 use super::classes::most_probable_first;
 use super::hypothesis::Hypothesis;
+use super::memo::Memo;
 use super::ripple::Ripple;
 use super::screen::Screened;
 use super::search::{Found, Search, candidates, sort};
@@ -97,6 +98,8 @@ impl Atlas {
     /// # Errors
     /// Runs of fewer than three laps, or of another shape than the atlas was made for.
     pub fn diagnose(&self, simulate: &Simulate<'_>, runs: &[Vec<track::Lap>]) -> Result<LapDiagnosis, Error> {
+        let memo = Memo::new(simulate, &self.spent);
+        let simulate: &Simulate<'_> = &|effects, set| memo.simulate(effects, set);
         let data = self.observed(runs)?;
         let residual = self.white(&data, &self.null);
         let numbers = FourNumbers::new(&residual, &self.layout);
@@ -386,6 +389,8 @@ impl Atlas {
         runs: &[Vec<track::Lap>],
         effects: &[Setting],
     ) -> Result<(FourNumbers, Option<FourNumbers>), Error> {
+        let memo = Memo::new(simulate, &self.spent);
+        let simulate: &Simulate<'_> = &|effects, set| memo.simulate(effects, set);
         let data = self.observed(runs)?;
         let before = FourNumbers::new(&self.white(&data, &self.null), &self.layout);
         if effects.is_empty() {

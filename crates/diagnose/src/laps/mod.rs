@@ -14,6 +14,7 @@ mod last_look;
 mod layout;
 mod likeliest;
 mod likelihood;
+mod memo;
 mod pairs;
 mod parabola;
 mod probe;

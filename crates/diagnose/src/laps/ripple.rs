@@ -122,7 +122,6 @@ impl Atlas {
         sets: u64,
     ) -> Option<Vec<DVector<f64>>> {
         let settings = hypothesis.settings(self);
-        self.spent.add(sets);
         (0..sets)
             .into_par_iter()
             .map(|set| simulate(&settings, set).map(|runs| spectrum(&runs)))

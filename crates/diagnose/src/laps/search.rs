@@ -309,8 +309,13 @@ impl Search<'_> {
 
     /// Explanations with what explains best what they leave beside them, tried to the end.
     pub(super) fn further<'f>(&self, best: impl Iterator<Item = &'f Found>) -> Vec<Found> {
+        /// Share of the best score below which a third effect does not make up for what the first two leave.
+        const WORTH: f64 = 0.95;
         let mut starts: Vec<Hypothesis> = Vec::new();
-        for base in of_other_effects(best).into_iter().take(BASES) {
+        let bases = of_other_effects(best);
+        let score = |found: &Found| found.explanation.score;
+        let least = bases.first().map_or(0.0, |first| WORTH * score(first));
+        for base in bases.into_iter().take(BASES).filter(|base| score(base) >= least) {
             let left = &base.left;
             let base = self.base(base.hypothesis.clone());
             let further = self.beside(&base, left, &starts);

@@ -78,7 +78,6 @@ impl Atlas {
             .into_par_iter()
             .filter_map(|set| Some((self.summary(simulate, effects, set)?, &self.samples[set as usize])))
             .collect();
-        self.spent.add(sets);
         if (found.len() as f64) < ENOUGH * sets as f64 {
             return None;
         }
@@ -133,7 +132,6 @@ impl Atlas {
         settings: &[Setting],
         sets: Range<u64>,
     ) -> Option<Vec<Summary>> {
-        self.spent.add(sets.end - sets.start);
         sets.into_par_iter()
             .map(|set| self.summary(simulate, settings, set))
             .collect()

@@ -56,7 +56,6 @@ impl Atlas {
             .into_par_iter()
             .map(|set| simulate(&settings, set))
             .collect::<Option<_>>()?;
-        self.spent.add(SETS);
         let without = if others.is_empty() {
             self.declared_mean(0..SETS)
         } else {
