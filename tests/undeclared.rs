@@ -366,6 +366,23 @@ fn a_wheel_out_of_round_is_known_by_how_laps_ripple() {
     assert!((share - SHARE).abs() < 0.15 * SHARE, "{found:#}");
 }
 
+/// Filtered, it looks like more slip: another phase in every run, and none in their mean.
+#[test]
+fn a_wheel_out_of_round_is_one_wheel_in_logs() {
+    const SHARE: f64 = 0.08;
+    let scratch = Scratch::new();
+    let mut robot = Robot::with(Setting::constant(&LOBED, [SHARE]));
+    robot.controller = ground::rule_based();
+    robot.logged(&[3; 3]).record(&scratch, "set");
+    let found = trace(&scratch, "rule-based", "set", &[]);
+    says(&found, "explained", &["unlisted"]);
+    let effect = &found["effects"][0];
+    assert_eq!(effect["acts_on"], "right wheel", "{found:#}");
+    assert_eq!(effect["depends_on"], "wheel angle", "{found:#}");
+    let share = effect["coefficients"][0].as_f64().unwrap();
+    assert!((share - SHARE).abs() < 0.05 * SHARE, "{found:#}");
+}
+
 #[test]
 fn a_tilted_camera_is_known_by_its_scale_over_the_floor() {
     const PER_M: f64 = 0.03;

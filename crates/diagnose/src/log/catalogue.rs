@@ -202,9 +202,36 @@ pub(crate) fn stage_of(setting: &Setting) -> Stage {
     };
     match UNLISTED.params[0].choices.get(acts_on as usize) {
         Some(&("reading" | "left-right difference")) => Stage::Sense,
-        Some(&("camera x" | "camera y")) => Stage::Observe,
+        Some(&("camera x" | "camera y" | "camera scale")) => Stage::Observe,
         _ => Stage::Act,
     }
+}
+
+/// Each wheel's speed by its own angle.
+pub(crate) fn wheel_variants() -> Vec<Variant> {
+    let number = |param: usize, word: &str| {
+        UNLISTED.params[param]
+            .choices
+            .iter()
+            .position(|name| *name == word)
+    };
+    let variant = |wheel: &&str| {
+        let words = [
+            number(0, wheel)?,
+            number(1, "wheel angle")?,
+            number(2, "harmonics")?,
+        ];
+        let zeros = [0.0, 0.0];
+        Some(Variant {
+            spec: &UNLISTED,
+            shape: Shape::Linear,
+            values: words.map(|word| word as f64).into_iter().chain(zeros).collect(),
+            sizes: vec![3, 4],
+            free: vec![3, 4],
+            steps: vec![0.01; 2],
+        })
+    };
+    ["left wheel", "right wheel"].iter().filter_map(variant).collect()
 }
 
 /// Groups of basis functions for an effect without a name: every target with every dependence.

@@ -21,6 +21,7 @@ use super::rows::LogRow;
 use super::screen::normals;
 use super::search::{By, Lead, Refined, leads, price, pursue, shortlist, together};
 use super::steps::reading_step;
+use super::wheels::out_of_round;
 use crate::answer::{ALTERNATIVE, indistinguishable};
 use crate::corners::{Corners, EXACT};
 use crate::{Answer, Candidate, Cause, Detectable, Error, Explanation, Verdict};
@@ -499,6 +500,13 @@ impl<'a> Search<'a> {
     /// What is left beside the best explanation, and whether that makes it dishonest to name it.
     fn judge(&mut self) {
         let gain = self.found.first().map_or(0.0, |best| best.gain);
+        if let Some(wheels) = out_of_round(&self.evidence, self.best(), FAULTS * gain) {
+            self.unlisted = Cause::of(&wheels.settings[0]).map(|cause| {
+                let refined = Some(wheels).filter(|wheels| wheels.score() > gain);
+                Unnamed { cause, refined }
+            });
+            return;
+        }
         let matters = self.remainder.1 < 1e-3 && self.remainder.0 > MATTERS;
         if matters || self.found.is_empty() {
             self.unlisted = self.characterise(gain);

@@ -23,6 +23,7 @@ mod screen;
 mod search;
 mod separation;
 mod steps;
+mod wheels;
 
 pub use decide::Decided;
 pub use diagnosis::{Channel, LogDiagnosis, diagnose_logs};

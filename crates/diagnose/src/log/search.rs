@@ -139,7 +139,7 @@ fn by_time(variant: usize, normals: &[Normal]) -> Lead {
     }
 }
 
-fn by_run(evidence: &Evidence<'_>, variant: usize, normals: &[Normal], runs: &[usize]) -> Lead {
+pub(crate) fn by_run(evidence: &Evidence<'_>, variant: usize, normals: &[Normal], runs: &[usize]) -> Lead {
     let of = |run: usize| {
         let mine = evidence
             .stretches
