@@ -366,6 +366,24 @@ fn a_wheel_out_of_round_is_known_by_how_laps_ripple() {
     assert!((share - SHARE).abs() < 0.15 * SHARE, "{found:#}");
 }
 
+#[test]
+fn sensors_that_warm_up_settle_in_logs() {
+    const SHARE: f64 = 0.2;
+    let scratch = Scratch::new();
+    let robot = Robot::with(Setting::constant(&WARMING, [SHARE]));
+    robot.logged(&[4; 3]).record(&scratch, "set");
+    let found = trace(&scratch, "braitenberg", "set", &[]);
+    says(&found, "explained", &["unlisted"]);
+    let effect = &found["effects"][0];
+    for (key, word) in [("stage", "sense"), ("acts_on", "reading"), ("basis", "settling")] {
+        assert_eq!(effect[key], word, "{found:#}");
+    }
+    for (i, truth) in [SHARE, -SHARE, WARMING_S].into_iter().enumerate() {
+        let said = effect["coefficients"][i].as_f64().unwrap();
+        assert!((said / truth - 1.0).abs() < 0.15, "{found:#}");
+    }
+}
+
 /// Filtered, it looks like more slip: another phase in every run, and none in their mean.
 #[test]
 fn a_wheel_out_of_round_is_one_wheel_in_logs() {

@@ -177,11 +177,12 @@ impl Answer {
 
     /// This answer, unless it, or another that the data do not tell from it, is a slower wheel and more slip whose sizes
     /// follow from one another, as they do if wheels stand still in a share of the physics steps: one cause without a name,
-    /// then, rather than two with theirs. `slip_level` is the declared model's.
+    /// then, rather than two with theirs; so is noise without a name. `slip_level` is the declared model's.
     #[must_use]
     pub fn unless_stalls(mut self, slip_level: f64) -> Self {
         let alike = &self.explanations[..self.indistinguishable];
-        if self.claimed().is_some()
+        let is_noise = |cause: &Cause| cause.depends_on == "chance";
+        if (self.claimed().is_some() || self.cause.as_ref().is_some_and(is_noise))
             && alike
                 .iter()
                 .any(|explanation| are_stalls(explanation, slip_level))
@@ -298,6 +299,18 @@ mod tests {
         assert_eq!(doubted.clone().unless_stalls(0.1).verdict, Verdict::Explained);
         doubted.indistinguishable = 2;
         assert_eq!(doubted.unless_stalls(0.1).verdict, Verdict::Unexplained);
+    }
+
+    #[test]
+    fn noise_without_a_name_is_theirs_too() {
+        let mut refused = answer(0.9, slip_of_stalls());
+        refused.verdict = Verdict::Unexplained;
+        refused.cause = Some(Cause {
+            stage: Stage::Sense,
+            acts_on: "reading".into(),
+            depends_on: "chance".into(),
+        });
+        assert_eq!(refused.unless_stalls(0.1).cause.unwrap().stage, Stage::Act);
     }
 
     #[test]

@@ -7,11 +7,12 @@ use rayon::prelude::*;
 use sim::{Model, Pattern, Scene, Setting, Stage, World, find};
 use track::Side;
 
-use super::catalogue::{Variant, unlisted_variants, variants};
+use super::catalogue::{Variant, variants};
 use super::decide::{Decided, decided};
 use super::detectable::detectable;
 use super::evidence::Evidence;
 use super::filter::{MEASURED, Trace};
+use super::groups::unlisted_variants;
 use super::noise::{Factor, by_chance, noises, p_among, p_among_repeats, with_memory};
 use super::pairs::pairs;
 use super::recut::recut;
@@ -20,6 +21,7 @@ use super::repeat::repeats;
 use super::rows::LogRow;
 use super::screen::normals;
 use super::search::{By, Lead, Refined, leads, price, pursue, shortlist, together};
+use super::settling::settling;
 use super::steps::reading_step;
 use super::wheels::out_of_round;
 use crate::answer::{ALTERNATIVE, indistinguishable};
@@ -398,8 +400,8 @@ impl<'a> Search<'a> {
                     let one = std::slice::from_ref(n);
                     p_among_repeats(&self.evidence, &best.settings, one, SIGNIFICANT_P) < SIGNIFICANT_P
                 })
-                .and_then(|n| n.refined(&self.evidence, &best.settings, self.total() + best.gain));
-            more.extend(noise.map(|n| n.after(&best)));
+                .map(|n| self.beside_rivals(&n, &best));
+            more.extend(noise.into_iter().flatten());
         }
         if best.by == By::Constant {
             let mut starts = self.beside(&best, leads);
@@ -424,6 +426,24 @@ impl<'a> Search<'a> {
         if let Some(screened) = self.screen(&best.settings) {
             self.settle(&screened.0, &screened.1, best.gain);
         }
+    }
+
+    /// A noise effect beside the best candidate, and beside single effects that explain nearly as much: large noise hides what tells
+    /// them apart.
+    fn beside_rivals(&self, noise: &Factor, best: &Refined) -> Vec<Refined> {
+        const NEARLY: f64 = 0.98;
+        const MOST: usize = 3;
+        let is_rival = |other: &&Refined| {
+            other.settings == best.settings
+                || other.score() > NEARLY * best.score() && other.names() != best.names()
+        };
+        (self.found.iter().filter(is_rival).take(MOST))
+            .filter_map(|one| {
+                let base = self.total() + one.gain;
+                let noise = noise.elsewhere(&self.evidence, &one.settings, base)?;
+                Some(noise.refined(&self.evidence, &one.settings, base)?.after(one))
+            })
+            .collect()
     }
 
     /// Each effect of a pair refined without the other, from where it is.
@@ -504,6 +524,14 @@ impl<'a> Search<'a> {
             self.unlisted = Cause::of(&wheels.settings[0]).map(|cause| {
                 let refined = Some(wheels).filter(|wheels| wheels.score() > gain);
                 Unnamed { cause, refined }
+            });
+            return;
+        }
+        let settles = (self.found.first()).and_then(|best| settling(&self.evidence, best, self.total()));
+        if let Some(settles) = settles {
+            self.unlisted = Cause::of(&settles.settings[0]).map(|cause| Unnamed {
+                cause,
+                refined: Some(settles),
             });
             return;
         }

@@ -12,6 +12,7 @@ mod detectable;
 mod diagnosis;
 mod evidence;
 mod filter;
+mod groups;
 mod moments;
 mod noise;
 mod pairs;
@@ -22,6 +23,7 @@ mod rows;
 mod screen;
 mod search;
 mod separation;
+mod settling;
 mod steps;
 mod wheels;
 

@@ -172,6 +172,12 @@ impl Factor {
         Some(self)
     }
 
+    /// The same factor beside other settings, from where it is.
+    pub(crate) fn elsewhere(&self, evidence: &Evidence<'_>, settings: &[Setting], base: f64) -> Option<Self> {
+        let gain = self.at(evidence, settings, self.middle)? - base;
+        Some(Self { gain, ..self.clone() })
+    }
+
     /// The settings with the best factor and its error.
     pub(crate) fn refined(
         mut self,

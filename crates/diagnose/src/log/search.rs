@@ -102,7 +102,7 @@ fn sums(normals: impl Iterator<Item = Normal>) -> Option<Normal> {
     })
 }
 
-fn constant(variant: usize, normals: &[Normal]) -> Lead {
+pub(crate) fn constant(variant: usize, normals: &[Normal]) -> Lead {
     let sum = sums(normals.iter().cloned());
     let information = (sum.as_ref()).map_or(DVector::zeros(0), |sum| sum.left.diagonal());
     let solution = sum.map(|sum| solve(&sum.left, &sum.right));

@@ -4,16 +4,14 @@ use rayon::prelude::*;
 use sim::{Pattern, Setting};
 use statrs::statistics::Statistics;
 
-use super::catalogue::{Variant, wheel_variants};
+use super::catalogue::Variant;
 use super::evidence::Evidence;
+use super::groups::{WORDS, wheel_variants};
 use super::screen::normals;
 use super::search::{By, Lead, Refined, by_run, start, together};
 
 /// Steps of a refinement at most.
 const STEPS: usize = 8;
-
-/// Values before the coefficients: what a wheel's effect acts on and depends on, and its basis.
-const WORDS: usize = 3;
 
 /// The wheels out of round that the innovations beside some effects show surely, fitted in place of these effects: a cosine and a sine
 /// of each wheel's angle in each run, of which the amplitude is the answer's size. `worth` is the log-likelihood that each wheel must
