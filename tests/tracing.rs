@@ -74,11 +74,16 @@ impl Robot {
         scratch.write(&format!("{folder}/dataset.toml"), self.description(folder));
     }
 
-    fn description(&self, name: &str) -> String {
-        let controller = match self.controller {
+    /// As models call it.
+    pub(crate) fn controller_name(&self) -> &'static str {
+        match self.controller {
             Controller::Braitenberg { .. } => "braitenberg",
             Controller::RuleBased { .. } => "rule-based",
-        };
+        }
+    }
+
+    fn description(&self, name: &str) -> String {
+        let controller = self.controller_name();
         let most = self.laps.iter().max().unwrap();
         format!(
             "name = {name:?}\nworld = \"roduit2007\"\ncontroller = {controller:?}\nruns = {:?}\nlaps = {most}\n\

@@ -1,6 +1,9 @@
 //! Effects that the program does not know, written here: it sees nothing of them but files.
 
-use sim::{Effect, Machine, Moment, Param, Pattern, Readings, Setting, Spec, Stage, Vec2, WheelSpeeds};
+use serde_json::Value;
+use sim::{
+    Controller, Effect, Machine, Moment, Param, Pattern, Readings, Setting, Spec, Stage, Vec2, WheelSpeeds,
+};
 
 use crate::ground;
 use crate::support::Scratch;
@@ -300,49 +303,76 @@ fn a_listed_effect_under_another_name_is_named_from_logs() {
     assert_eq!(found["logs"]["confirmed_by_laps"], true, "{found:#}");
 }
 
+/// The answer to logs of a robot with one listed effect, which has to be that effect alone.
+fn alone_in_logs(controller: Controller, laps: &[usize], name: &'static str, values: &[f64]) -> Value {
+    let scratch = Scratch::new();
+    let effect = Setting::constant(sim::find(name).unwrap(), values);
+    let mut robot = Robot::with(effect);
+    robot.controller = controller;
+    let robot = robot.logged(laps);
+    robot.record(&scratch, "set");
+    let mut found = trace(&scratch, robot.controller_name(), "set", &[]);
+    says(&found, "explained", &[name]);
+    found["effects"][0].take()
+}
+
 #[test]
 fn an_offset_that_cuts_most_readings_is_one_effect_in_logs() {
-    const COUNTS: f64 = -73.0;
-    let scratch = Scratch::new();
-    let offset = Setting::constant(sim::find("ambient-offset").unwrap(), [COUNTS]);
-    Robot::with(offset).logged(&[3; 3]).record(&scratch, "set");
-    let found = trace(&scratch, "braitenberg", "set", &[]);
-    says(&found, "explained", &["ambient-offset"]);
-    holds(&found["effects"][0], "counts", COUNTS, 0.0);
+    let effect = alone_in_logs(ground::braitenberg(), &[3; 3], "ambient-offset", &[-73.0]);
+    holds(&effect, "counts", -73.0, 0.0);
+}
+
+/// Most readings of the rule-based robot are 0 then, and no quieter for that.
+#[test]
+fn readings_that_are_cut_are_no_quieter_for_that() {
+    let effect = alone_in_logs(ground::rule_based(), &[3; 3], "ambient-offset", &[-27.0]);
+    holds(&effect, "counts", -27.0, 0.0);
 }
 
 #[test]
 fn sensors_that_lag_have_their_time_in_logs() {
-    const TIME_S: f64 = 0.0752;
-    let scratch = Scratch::new();
-    let lag = Setting::constant(sim::find("sensor-lag").unwrap(), [TIME_S]);
-    Robot::with(lag).logged(&[6; 3]).record(&scratch, "set");
-    let found = trace(&scratch, "braitenberg", "set", &[]);
-    says(&found, "explained", &["sensor-lag"]);
-    holds(&found["effects"][0], "time_s", TIME_S, 0.0);
+    let effect = alone_in_logs(ground::braitenberg(), &[6; 3], "sensor-lag", &[0.0752]);
+    holds(&effect, "time_s", 0.0752, 0.0);
 }
 
 #[test]
 fn readings_in_coarse_steps_are_nothing_else_in_logs() {
     // Of which few multiples occur.
-    const COUNTS: f64 = 146.27;
-    let scratch = Scratch::new();
-    let step = Setting::constant(sim::find("reading-step").unwrap(), [COUNTS]);
-    Robot::with(step).logged(&[3; 3]).record(&scratch, "set");
-    let found = trace(&scratch, "braitenberg", "set", &[]);
-    says(&found, "explained", &["reading-step"]);
-    holds(&found["effects"][0], "counts", COUNTS, 0.0);
+    let effect = alone_in_logs(ground::braitenberg(), &[3; 3], "reading-step", &[146.27]);
+    holds(&effect, "counts", 146.27, 0.0);
 }
 
 #[test]
 fn a_wall_that_is_elsewhere_is_one_effect_in_logs() {
-    const DISTANCE_M: f64 = 0.0039;
-    let scratch = Scratch::new();
-    let wall = Setting::constant(sim::find("inner-wall-offset").unwrap(), [DISTANCE_M]);
-    Robot::with(wall).logged(&[3; 3]).record(&scratch, "set");
-    let found = trace(&scratch, "braitenberg", "set", &[]);
-    says(&found, "explained", &["inner-wall-offset"]);
-    holds(&found["effects"][0], "distance_m", DISTANCE_M, 0.0);
+    let effect = alone_in_logs(ground::braitenberg(), &[3; 3], "inner-wall-offset", &[0.0039]);
+    holds(&effect, "distance_m", 0.0039, 0.0);
+}
+
+/// Readings are first judged from where the robot would be without it; corners of walls elsewhere made up for what that spoils.
+#[test]
+fn a_marker_ahead_of_the_axle_has_its_distance_in_logs() {
+    let effect = alone_in_logs(
+        ground::braitenberg(),
+        &[5; 4],
+        "marker-offset",
+        &[0.0109, 0.0, 0.0],
+    );
+    holds(&effect, "forward_m", 0.0109, 0.0);
+}
+
+/// A dent seems to be a patch as long as readings count that the dent takes out of range.
+#[test]
+fn a_dent_that_takes_a_wall_out_of_range_is_no_patch_in_logs() {
+    let values = [1.0, 0.509, -0.0074, 0.0588];
+    let effect = alone_in_logs(ground::braitenberg(), &[5; 4], "wall-bump", &values);
+    holds(&effect, "height_m", values[2], 0.0);
+}
+
+/// Of the commands one in fifty is slower; a band half a millimetre per second wider would swallow twice as many.
+#[test]
+fn a_dead_band_just_below_most_commands_is_found_in_logs() {
+    let effect = alone_in_logs(ground::braitenberg(), &[3; 3], "dead-band", &[0.0424]);
+    holds(&effect, "speed_m_s", 0.0424, 0.0);
 }
 
 /// The mean lap says nothing of it, and all in all laps scatter as with more slip.

@@ -9,7 +9,7 @@ use crate::cast::LANES;
 use crate::effects::{Active, Moment};
 use crate::outlook::{Look, Outlook};
 use crate::world::World;
-use crate::{Error, Machine, Pose, Readings, Setting, WheelSpeeds};
+use crate::{Error, Machine, Pose, ReadingNoise, Readings, Setting, WheelSpeeds};
 
 /// A 3 x 3 matrix over x (m), y (m) and heading (rad), row by row.
 pub type PoseMatrix = [[f64; 3]; 3];
@@ -137,6 +137,11 @@ impl<'w> Forecast<'w> {
     /// The machine's constants as they are now.
     pub fn machine(&self) -> &Machine {
         &self.apparatus.machine
+    }
+
+    /// The noise of readings that the model declares, before any effect.
+    pub fn declared_noise(&self) -> ReadingNoise {
+        self.apparatus.world.declared_noise()
     }
 
     /// Goes to the control step that begins at `time_s`, seconds since the run began.

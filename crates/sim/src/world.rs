@@ -6,7 +6,7 @@ use track::{Chain, Course, Direction, Gates, Side, Vec2, Vertex, Way};
 
 use crate::cast::{Caster, CasterKind, Cells};
 use crate::effects::{Active, Site};
-use crate::{Error, Machine, Model, RunRules, WallPlace, WallRules, Walls};
+use crate::{Error, Machine, Model, ReadingNoise, RunRules, WallPlace, WallRules, Walls};
 
 /// A course with its gates.
 #[derive(Debug, Clone)]
@@ -325,6 +325,11 @@ impl World<'_> {
     /// How runs begin, tick and end.
     pub fn rules(&self) -> &RunRules {
         &self.model.run
+    }
+
+    /// The noise of readings that the model declares, before any effect.
+    pub fn declared_noise(&self) -> ReadingNoise {
+        self.model.machine.noise
     }
 
     /// The straight pieces that rays hit.

@@ -262,7 +262,8 @@ fn candidate(explanation: &Explanation, numbers: &FourNumbers) -> Value {
     })
 }
 
-fn distinct<T: PartialEq>(items: impl Iterator<Item = T>) -> Vec<T> {
+/// Each item once, in the order in which they first come.
+pub(super) fn distinct<T: PartialEq>(items: impl Iterator<Item = T>) -> Vec<T> {
     let mut list = Vec::new();
     for item in items {
         if !list.contains(&item) {

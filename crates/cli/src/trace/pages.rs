@@ -4,6 +4,8 @@ use anyhow::Result;
 use diagnose::{Candidate, Cause, Explanation, FourNumbers, Quadratic, Verdict};
 use sim::Pattern;
 
+use super::answer::rivals;
+use super::document::distinct;
 use super::limits::{limits, next_experiment, next_in_words, stages};
 use super::unnamed::unnamed;
 use super::{MeanLaps, Trace, mean, pictures};
@@ -84,15 +86,13 @@ pub(crate) fn summary(trace: &Trace) -> String {
             format!("{word}: {}; {explains}.{rest}", what.join(" and "))
         }
     };
-    let rivals: Vec<String> = diagnosis.explanations[..diagnosis.indistinguishable]
-        .iter()
-        .skip(1)
-        .map(Explanation::label)
-        .collect();
-    let alternatives = if rivals.is_empty() {
+    // Two sizes of one effect are no two answers.
+    let answers = distinct(rivals(diagnosis).iter().map(Explanation::label));
+    let others = answers.get(1..).unwrap_or_default();
+    let alternatives = if others.is_empty() {
         String::new()
     } else {
-        format!(" These laps do not tell it apart from: {}.", rivals.join("; "))
+        format!(" These laps do not tell it apart from: {}.", others.join("; "))
     };
     let next = next_in_words(trace).map_or(String::new(), |next| format!("\n{next}"));
     format!(

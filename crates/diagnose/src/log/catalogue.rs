@@ -3,7 +3,7 @@
 
 use std::f64::consts::TAU;
 
-use sim::{EFFECTS, Pattern, Setting, Spec, Stage, UNLISTED};
+use sim::{EFFECTS, Pattern, Setting, Spec, Stage, UNLISTED, WheelSpeeds};
 
 /// How the multiples of a variant's columns become values.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -99,13 +99,35 @@ impl Variant {
     }
 }
 
-/// All variants. `wall_lengths_m` are those of the outer and the inner wall.
-pub(crate) fn variants(wall_lengths_m: [f64; 2]) -> Vec<Variant> {
-    EFFECTS.iter().flat_map(|spec| of(spec, wall_lengths_m)).collect()
+/// All variants. `wall_lengths_m` are those of the outer and the inner wall, `dead_bands_m_s` the speeds that are tried
+/// as dead bands ([`slow_speeds`]).
+pub(crate) fn variants(wall_lengths_m: [f64; 2], dead_bands_m_s: &[f64]) -> Vec<Variant> {
+    (EFFECTS.iter())
+        .flat_map(|spec| of(spec, wall_lengths_m, dead_bands_m_s))
+        .collect()
+}
+
+/// Speeds below which ever larger shares of the commands to the wheels are, m/s, rising: a dead band that is a little too large
+/// swallows more commands than the right one, so that where the commands are decides which sizes are near each other.
+pub(crate) fn slow_speeds(commands: impl Iterator<Item = WheelSpeeds>) -> Vec<f64> {
+    const SHARES: [f64; 9] = [5e-4, 2e-3, 6e-3, 0.015, 0.03, 0.06, 0.12, 0.24, 0.48];
+    let mut speeds: Vec<f64> = commands
+        .flat_map(|command| [command.left_m_s.abs(), command.right_m_s.abs()])
+        .filter(|speed| *speed > 0.0)
+        .collect();
+    speeds.sort_by(f64::total_cmp);
+    let above = |share: &f64| {
+        let below = *speeds.get((share * speeds.len() as f64) as usize)?;
+        let next = speeds[speeds.partition_point(|speed| *speed <= below)..].first()?;
+        Some(0.5 * (below + next))
+    };
+    let mut sizes: Vec<f64> = SHARES.iter().filter_map(above).collect();
+    sizes.dedup();
+    sizes
 }
 
 /// The variants of one effect; none for the effects on the controller and on noise, which are judged otherwise.
-fn of(spec: &'static Spec, wall_lengths_m: [f64; 2]) -> Vec<Variant> {
+fn of(spec: &'static Spec, wall_lengths_m: [f64; 2], dead_bands_m_s: &[f64]) -> Vec<Variant> {
     let one = |neutral: f64, step: f64| vec![Variant::linear(spec, &[neutral], &[(0, step)])];
     let scan = |sizes: &[f64]| -> Vec<Variant> {
         (sizes.iter())
@@ -144,7 +166,7 @@ fn of(spec: &'static Spec, wall_lengths_m: [f64; 2]) -> Vec<Variant> {
         "sensor-lag" => scan(&[0.04, 0.08, 0.15, 0.3, 0.6]),
         "motor-lag" => scan(&[0.01, 0.03, 0.08, 0.15, 0.3, 0.6]),
         "command-delay" => scan(&[0.032, 0.064, 0.096, 0.128, 0.192, 0.256, 0.32, 0.416, 0.512]),
-        "dead-band" => scan(&[0.01, 0.02, 0.03, 0.036, 0.04, 0.043, 0.046, 0.05, 0.055, 0.06]),
+        "dead-band" => scan(dead_bands_m_s),
         "acceleration-limit" => scan(&[0.02, 0.04, 0.08, 0.15, 0.3, 0.6, 1.2, 2.4]),
         "speed-step" => scan(&(2..60).map(|i| 5e-4 * f64::from(i)).collect::<Vec<_>>()),
         "floor-tilt" => vec![Variant {
@@ -204,5 +226,27 @@ pub(crate) fn stage_of(setting: &Setting) -> Stage {
         Some(&("reading" | "left-right difference")) => Stage::Sense,
         Some(&("camera x" | "camera y" | "camera scale")) => Stage::Observe,
         _ => Stage::Act,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn dead_bands_lie_between_the_commands_that_are_given() {
+        let command = |left_m_s: f64, right_m_s: f64| WheelSpeeds { left_m_s, right_m_s };
+        // Of three speeds, half of the commands are at the slowest; a band below it or above the fastest tells nothing.
+        let few = [command(0.02, 0.04), command(-0.02, 0.06)];
+        assert_eq!(slow_speeds(few.into_iter()), [0.03]);
+        // Of a thousand speeds an ever larger share is slower.
+        let many = (1..=1000).map(|i| command(f64::from(i) * 1e-4, 0.0));
+        let sizes = slow_speeds(many);
+        assert!(sizes.windows(2).all(|pair| pair[0] < pair[1]), "{sizes:?}");
+        assert!(
+            (sizes[3] - 0.0016).abs() < 1e-4 && sizes.last().unwrap() > &0.04,
+            "{sizes:?}"
+        );
+        assert!(slow_speeds(std::iter::empty()).is_empty());
     }
 }

@@ -77,6 +77,7 @@ impl Other<'_> {
                     read[lane] + instant.remembered[lane],
                     instant.deviation[lane],
                     step_counts,
+                    instant.deviation[lane],
                 )
                 .mean
                     - instant.expected[lane];

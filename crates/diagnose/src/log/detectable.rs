@@ -97,7 +97,7 @@ mod tests {
 
     #[test]
     fn sizes_stand_as_far_out_as_the_alarm_needs() {
-        let variants = super::super::catalogue::variants([3.0, 2.0]);
+        let variants = super::super::catalogue::variants([3.0, 2.0], &[0.01, 0.02]);
         let number = |name: &str| variants.iter().position(|v| v.spec.name == name).unwrap();
         let gain = number("reading-gain");
         let leads = [lead(gain, &[2.0])];
@@ -112,7 +112,7 @@ mod tests {
     #[test]
     fn a_limit_is_seen_below_and_a_band_above() {
         let spec = |name: &str| find(name).unwrap();
-        let variants = super::super::catalogue::variants([3.0, 2.0]);
+        let variants = super::super::catalogue::variants([3.0, 2.0], &[0.01, 0.02]);
         let of = |name: &str| -> Vec<Lead> {
             (variants.iter().enumerate())
                 .filter(|(_, variant)| variant.spec == spec(name))

@@ -5,9 +5,8 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 use sim::{Model, Pattern, Scene, Setting, Stage, World, find};
-use track::Side;
 
-use super::catalogue::{Variant, variants};
+use super::catalogue::Variant;
 use super::decide::{Decided, decided};
 use super::detectable::detectable;
 use super::evidence::Evidence;
@@ -77,7 +76,7 @@ pub fn diagnose_logs(model: &Model, scene: &Scene, runs: &[&[LogRow]]) -> Result
     if declared.stretches.is_empty() {
         return Err(Error::NoLog);
     }
-    let first = recut(&scene, &wide, &declared, &[]);
+    let first = recut(&scene, &wide, &declared, &[]).and_then(|found| found.cut);
     let mut search = Search::new(
         declared.elsewhere(first.as_ref().map_or(&scene, |found| &found.1)),
         step,
@@ -86,25 +85,30 @@ pub fn diagnose_logs(model: &Model, scene: &Scene, runs: &[&[LogRow]]) -> Result
     let Some(leads) = search.alone() else {
         return Ok(search.answer(decide, corners(&first)));
     };
-    // A large effect blurs where the corners are: they are looked for again beside the best candidate.
-    let again = recut(&scene, &wide, &declared, search.best());
-    let declared = declared.elsewhere(again.as_ref().map_or(&scene, |found| &found.1));
-    // So are the readings that no edge spoils, where rays go elsewhere with it; and once more, beside its better size.
-    let clear = declared.clear_with(search.best());
-    if corners(&again) == corners(&first) && clear.is_none() {
+    // Where walls or the robot then are elsewhere, so are the readings that no edge spoils.
+    let clear = search.evidence.clear_with_each(search.rivals());
+    let was_clear = clear.is_none();
+    if let Some(clear) = clear {
+        search = search.renewed(clear)?;
+    }
+    // A large effect blurs where the corners are: they are looked for again beside the best candidate, with the size that it has
+    // there and, as corners that are wrong spoil that too, with the one that it has between the declared walls.
+    let uncut = search.evidence.elsewhere(&scene);
+    let sizes = [
+        Some(search.best().to_vec()),
+        first.as_ref().and_then(|_| search.best_by(&uncut)),
+    ];
+    let again = (sizes.into_iter().flatten())
+        .filter_map(|settings| recut(&scene, &wide, &uncut, &settings))
+        .max_by(|a, b| a.log_likelihood.total_cmp(&b.log_likelihood))
+        .and_then(|found| found.cut);
+    if was_clear && corners(&again) == corners(&first) {
         search.finish(&leads);
         return Ok(search.answer(decide, corners(&first)));
     }
-    let mut renewed = match clear {
-        None => search.renewed(declared)?,
-        Some(clear) => {
-            let once = search.renewed(clear)?;
-            match declared.clear_with(once.best()) {
-                None => once,
-                Some(clear) => once.renewed(clear)?,
-            }
-        }
-    };
+    let declared = declared.elsewhere(again.as_ref().map_or(&scene, |found| &found.1));
+    let clear = declared.clear_with_each(search.rivals());
+    let mut renewed = search.renewed(clear.unwrap_or(declared))?;
     renewed.finish(&leads);
     Ok(renewed.answer(decide, corners(&again)))
 }
@@ -147,8 +151,6 @@ type Screened<'a> = (Vec<(World<'a>, Trace)>, Vec<Lead>);
 
 impl<'a> Search<'a> {
     fn new(evidence: Evidence<'a>, step: Option<f64>) -> Result<Self, Error> {
-        let course = &evidence.scene.circuit().course;
-        let lengths_m = [Side::Outer, Side::Inner].map(|side| course.wall(side).length_m());
         let traces = evidence.traces(&[]).ok_or(Error::NoLog)?;
         let base: Vec<f64> = traces.iter().map(|(_, trace)| trace.log_likelihood).collect();
         let unrounded = Evidence {
@@ -160,7 +162,7 @@ impl<'a> Search<'a> {
             None => 0.0,
         };
         Ok(Self {
-            variants: variants(lengths_m),
+            variants: evidence.variants(),
             channels: channels(&traces),
             steps: traces.iter().map(|(_, trace)| trace.instants.len()).sum(),
             base,
@@ -289,29 +291,45 @@ impl<'a> Search<'a> {
         self.found.first().map_or(&[], |best| &best.settings)
     }
 
+    /// The effects of the best candidates, which may change places where other readings count.
+    fn rivals(&self) -> impl Iterator<Item = &[Setting]> {
+        const NEARLY: f64 = 0.8;
+        const MOST: usize = 3;
+        let best = self.found.first().map_or(0.0, Refined::score);
+        (self.found.iter().take(MOST))
+            .filter(move |other| other.score() >= NEARLY * best)
+            .map(|other| other.settings.as_slice())
+    }
+
     /// The same search with other evidence, its candidates refined again by it.
     fn renewed<'b>(self, evidence: Evidence<'b>) -> Result<Search<'b>, Error> {
         let mut renewed = Search::new(evidence, self.step)?;
         (renewed.p, renewed.detectable) = (self.p, self.detectable);
         renewed.found = (self.found.iter())
-            .filter_map(|found| renewed.renew(found))
+            .filter_map(|found| renewed.renew(found, &renewed.evidence, renewed.total()))
             .collect();
         renewed.sort();
         Ok(renewed)
     }
 
-    /// A candidate refined again, from where it is.
-    fn renew(&self, found: &Refined) -> Option<Refined> {
+    /// The effects of the best candidate refined again by other evidence.
+    fn best_by(&self, evidence: &Evidence<'_>) -> Option<Vec<Setting>> {
+        let renewed = self.renew(self.found.first()?, evidence, evidence.likelihood(&[])?)?;
+        Some(renewed.settings)
+    }
+
+    /// A candidate refined again, from where it is, by evidence with this log-likelihood of the declared model.
+    fn renew(&self, found: &Refined, evidence: &Evidence<'_>, base: f64) -> Option<Refined> {
         let variant = Variant::of(&found.settings[0], &self.variants);
         match (variant, found.by) {
             (Some(variant), By::Constant) if !jumps(&found.settings[0]) => together(
-                &self.evidence,
+                evidence,
                 &[(variant.clone(), found.settings[0].clone())],
-                self.total(),
+                base,
                 STEPS,
             ),
             _ => {
-                let gain = self.evidence.likelihood(&found.settings)? - self.total();
+                let gain = evidence.likelihood(&found.settings)? - base;
                 Some(Refined {
                     gain,
                     ..found.clone()
@@ -540,7 +558,7 @@ impl<'a> Search<'a> {
             self.unlisted = self.characterise(gain);
         }
         if self.unlisted.is_none() {
-            self.unlisted = rough(&self.channels).filter(|_| !self.is_rough_by_itself());
+            self.unlisted = rough(&self.channels, FAULTS * gain).filter(|_| !self.is_rough_by_itself());
         }
     }
 
@@ -585,9 +603,17 @@ impl<'a> Search<'a> {
 
     fn answer(self, decide: Decided, corners: Corners) -> LogDiagnosis {
         let certain = self.certain(&decide);
-        let mut explanations: Vec<Explanation> = (self.found.iter().take(12))
-            .map(|refined| self.explanation(refined, &certain))
-            .collect();
+        let mut explanations: Vec<Explanation> = Vec::new();
+        for refined in self.found.iter().take(12) {
+            let explanation = self.explanation(refined, &certain);
+            // What was refined from several sizes may have come to one.
+            if explanations
+                .iter()
+                .all(|other| other.label() != explanation.label())
+            {
+                explanations.push(explanation);
+            }
+        }
         let unnamed = self.unlisted.as_ref().and_then(|u| u.refined.as_ref());
         if let Some(refined) = unnamed {
             explanations.insert(0, self.explanation(refined, &certain));
@@ -738,11 +764,15 @@ struct Unnamed {
     refined: Option<Refined>,
 }
 
-/// Noise that no normal distribution has: innovations with heavy tails that are no edges of readings.
-fn rough(channels: &[Channel; MEASURED]) -> Option<Unnamed> {
+/// Noise that no normal distribution has: innovations with heavy tails that are no edges of readings, and that are worth more than
+/// `small` units of log-likelihood.
+fn rough(channels: &[Channel; MEASURED], small: f64) -> Option<Unnamed> {
     let heavy = |channel: &Channel| {
-        let deviation = (24.0 / channel.count.max(1) as f64).sqrt();
-        channel.kurtosis > 3.3 && channel.kurtosis - 3.0 > 10.0 * deviation
+        let count = channel.count.max(1) as f64;
+        let excess = channel.kurtosis - 3.0;
+        // What a law with that fourth cumulant gains over the normal one, to second order (Edgeworth's series).
+        let gain = count * excess * excess / 48.0;
+        excess > 0.3 && excess > 10.0 * (24.0 / count).sqrt() && gain > small
     };
     let camera = channels[..2].iter().any(heavy);
     let readings = channels[2..].iter().filter(|channel| heavy(channel)).count();

@@ -2,10 +2,11 @@
 
 use rayon::prelude::*;
 use sim::{Forecast, Model, Pattern, Scene, Setting, World};
+use track::Side;
 
-use super::catalogue::stage_of;
+use super::catalogue::{Variant, slow_speeds, stage_of, variants};
 use super::columns::columns;
-use super::filter::{Trace, Used, clear_readings, filter, likelihood, reaches_elsewhere};
+use super::filter::{Trace, Used, clear_readings, filter, leads_elsewhere, likelihood, reaches_elsewhere};
 use super::rows::{LogRow, stretches};
 use super::screen::{Normal, normal_of};
 use crate::candidate::within;
@@ -122,6 +123,16 @@ impl<'a> Evidence<'a> {
         })
     }
 
+    /// What is tried on these logs.
+    pub(crate) fn variants(&self) -> Vec<Variant> {
+        let course = &self.scene.circuit().course;
+        let commands = (self.stretches.iter()).flat_map(|stretch| stretch.rows.iter().map(|row| row.command));
+        variants(
+            [Side::Outer, Side::Inner].map(|side| course.wall(side).length_m()),
+            &slow_speeds(commands),
+        )
+    }
+
     /// The runs that gave evidence, in rising order.
     pub(crate) fn runs(&self) -> Vec<usize> {
         let mut runs: Vec<usize> = self.stretches.iter().map(|stretch| stretch.run).collect();
@@ -161,12 +172,20 @@ impl<'a> Evidence<'a> {
         }
     }
 
-    /// The evidence of the readings that count with these effects too, if rays then go elsewhere: others come near the end of
-    /// the range, and near edges.
-    pub(crate) fn clear_with(&self, settings: &[Setting]) -> Option<Self> {
+    /// The evidence of the readings that count with each of these models too; `None` if rays end elsewhere in none of them.
+    pub(crate) fn clear_with_each<'s>(&self, models: impl Iterator<Item = &'s [Setting]>) -> Option<Self> {
+        models.fold(None, |clear, settings| {
+            clear.as_ref().unwrap_or(self).clear_with(settings).or(clear)
+        })
+    }
+
+    /// The evidence of the readings that count with these effects too, if walls, or the robot, then are elsewhere: other rays
+    /// come near the end of the range, and near edges.
+    fn clear_with(&self, settings: &[Setting]) -> Option<Self> {
         let narrower = |stretch: &Stretch<'a>| {
             let (world, trace) = self.trace(stretch, settings)?;
-            if !reaches_elsewhere(&world, &self.world(&[], stretch.run).ok()?, &trace) {
+            let (other, declared) = self.trace(stretch, &[])?;
+            if !reaches_elsewhere(&world, &other, &trace) && !leads_elsewhere(&trace, &declared) {
                 return None;
             }
             let clear = clear_readings(&world, &trace, stretch.rows);

@@ -374,7 +374,12 @@ fn sense(
             .sum();
         let own_variance = noise.deviation(mean).powi(2) + outlook.edge_variance[lane];
         let deviation = (own_variance + pose_variance).sqrt();
-        let read = cut(mean, deviation, step_counts);
+        let read = cut(
+            mean,
+            deviation,
+            step_counts,
+            forecast.declared_noise().deviation(mean),
+        );
         (instant.expected[lane], instant.deviation[lane]) = (read.mean, deviation);
         if usable >> m & 1 == 0 {
             continue;
@@ -443,6 +448,18 @@ pub(crate) fn reaches_elsewhere(world: &World<'_>, other: &World<'_>, trace: &Tr
         let [own, other] = [&own, &other].map(|forecast| forecast.distances_m(instant.moved_from));
         own.iter().zip(&other).any(|(a, b)| (a - b).abs() > ALIKE_M)
     })
+}
+
+/// Whether the robot of one trace is elsewhere than that of another of the same rows, by a fair part of what poses may be off.
+pub(crate) fn leads_elsewhere(one: &Trace, other: &Trace) -> bool {
+    const PART: f64 = 0.25;
+    let apart_m = (one.instants.iter().zip(&other.instants)).map(|(one, other)| {
+        one.moved_from
+            .position
+            .distance_squared(other.moved_from.position)
+            .sqrt()
+    });
+    apart_m.sum::<f64>() > PART * OFF_M * one.instants.len() as f64
 }
 
 const SILHOUETTE_RAD: f64 = 0.06;

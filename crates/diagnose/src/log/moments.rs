@@ -12,14 +12,15 @@ pub(crate) struct Cut {
 }
 
 /// The moments of a reading that is normal with this mean and standard deviation before it is rounded to multiples of
-/// `step` (0 for none) and cut to [0, inf).
+/// `step` (0 for none) and cut to [0, inf). What is sure has a variance of `declared` ones all the same, by the declared
+/// model's standard deviation: one that followed the candidate's would make quiet readings likelier where all are 0.
 #[inline]
-pub(crate) fn cut(mean: f64, deviation: f64, step: f64) -> Cut {
-    /// Least variance of what is cut, in units of the uncut one's: a reading that is surely 0 is then about twice as likely, like
+pub(crate) fn cut(mean: f64, deviation: f64, step: f64, declared: f64) -> Cut {
+    /// Variance of a reading that is surely 0, in units of the declared one's: it is then about twice as likely, like
     /// its probability, as one that is 0 half of the time, and one that is not 0 after all is no proof of the contrary.
-    const LEAST: f64 = 0.16;
+    const SHUT: f64 = 0.16;
     if step > 0.0 {
-        return rounded(mean, deviation, step);
+        return rounded(mean, deviation, step, declared);
     }
     let z = mean / deviation;
     if z > 6.0 {
@@ -40,18 +41,24 @@ pub(crate) fn cut(mean: f64, deviation: f64, step: f64) -> Cut {
     };
     let first = mean * open + deviation * density;
     let second = (mean * mean + deviation * deviation) * open + mean * deviation * density;
+    let shut = (1.0 - 2.0 * open).max(0.0);
     Cut {
         mean: first,
-        variance: (second - first * first).max(LEAST * deviation * deviation),
+        variance: (1.0 - shut) * (second - first * first) + shut * SHUT * declared * declared,
         open,
     }
 }
 
 /// The same for multiples k of a step, by the probabilities of reaching each.
-fn rounded(mean: f64, deviation: f64, step: f64) -> Cut {
+fn rounded(mean: f64, deviation: f64, step: f64, declared: f64) -> Cut {
     if step < 0.5 * deviation {
         // Sheppard's correction; the rounding of a finer step is as good as noise.
-        return cut(mean, (deviation * deviation + step * step / 12.0).sqrt(), 0.0);
+        return cut(
+            mean,
+            (deviation * deviation + step * step / 12.0).sqrt(),
+            0.0,
+            declared,
+        );
     }
     let sure = (((mean - 7.0 * deviation) / step).floor().max(0.0)) as usize;
     let most = (((mean + 7.0 * deviation) / step).ceil().max(0.0)) as usize + 1;
@@ -66,7 +73,7 @@ fn rounded(mean: f64, deviation: f64, step: f64) -> Cut {
     }
     Cut {
         mean: step * (sure as f64 + first),
-        variance: (step * step * (second - first * first)).max(0.01 * deviation * deviation),
+        variance: (step * step * (second - first * first)).max(0.01 * declared * declared),
         open: open * step / (deviation * std::f64::consts::TAU.sqrt()),
     }
 }
@@ -77,16 +84,27 @@ mod tests {
 
     #[test]
     fn a_cut_standard_normal_by_hand() {
-        let half = cut(0.0, 1.0, 0.0);
+        let half = cut(0.0, 1.0, 0.0, 1.0);
         assert!((half.mean - 1.0 / std::f64::consts::TAU.sqrt()).abs() < 1e-12);
         assert!((half.variance - (0.5 - 1.0 / std::f64::consts::TAU)).abs() < 1e-12);
         assert!((half.open - 0.5).abs() < 1e-12);
         // Surely 0; a count more or less is no proof of the contrary.
-        let shut = cut(-9.0, 1.0, 0.0);
+        let shut = cut(-9.0, 1.0, 0.0, 1.0);
         assert!(
             shut.mean < 1e-9 && shut.variance > 0.1 && shut.open < 1e-9,
             "{shut:?}"
         );
+    }
+
+    #[test]
+    fn quiet_readings_are_no_likelier_where_all_are_zero() {
+        for step in [0.0, 40.0] {
+            let of = |deviation| cut(-27.0, deviation, step, 4.0).variance;
+            assert!((of(1.0) / of(4.0) - 1.0).abs() < 1e-6, "{step}");
+        }
+        // Where half of them are, they are.
+        let open = |deviation: f64| cut(0.0, deviation, 0.0, 4.0).variance;
+        assert!((open(2.0) / open(4.0) - 0.25).abs() < 1e-12);
     }
 
     #[test]
@@ -100,11 +118,14 @@ mod tests {
             (100.0, 35.0),
         ] {
             let h = 1e-4;
-            let slope = (cut(mean + h, 8.0, step).mean - cut(mean - h, 8.0, step).mean) / (2.0 * h);
-            assert!((slope - cut(mean, 8.0, step).open).abs() < 1e-6, "{mean} {step}");
+            let slope = (cut(mean + h, 8.0, step, 8.0).mean - cut(mean - h, 8.0, step, 8.0).mean) / (2.0 * h);
+            assert!(
+                (slope - cut(mean, 8.0, step, 8.0).open).abs() < 1e-6,
+                "{mean} {step}"
+            );
         }
         assert_eq!(
-            cut(100.0, 8.0, 0.0),
+            cut(100.0, 8.0, 0.0, 8.0),
             Cut {
                 mean: 100.0,
                 variance: 64.0,
@@ -116,7 +137,7 @@ mod tests {
     #[test]
     fn a_coarse_step_is_a_coin() {
         // Half way between two multiples, with little noise: either, with equal chance.
-        let coin = cut(150.0, 5.0, 100.0);
+        let coin = cut(150.0, 5.0, 100.0, 5.0);
         assert!((coin.mean - 150.0).abs() < 1e-9 && (coin.variance - 2500.0).abs() < 1e-6);
     }
 }

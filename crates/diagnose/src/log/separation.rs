@@ -3,9 +3,7 @@
 use std::sync::Arc;
 
 use sim::{Model, Pattern, Scene, Setting};
-use track::Side;
 
-use super::catalogue::variants;
 use super::evidence::Evidence;
 use super::refine::{jumps, knobs, refine};
 use super::rows::LogRow;
@@ -27,8 +25,7 @@ pub fn log_separation(
     true_model.effects.extend_from_slice(answer);
     let masks = Evidence::new(&scene, &true_model, runs, 0.0).ok()?;
     let evidence = Evidence { model, ..masks };
-    let course = &scene.circuit().course;
-    let variants = variants([Side::Outer, Side::Inner].map(|side| course.wall(side).length_m()));
+    let variants = evidence.variants();
     let knobs = (rival.iter().enumerate())
         .filter(|(_, setting)| !jumps(setting) && !matches!(setting.pattern, Pattern::ByRun(_)))
         .filter_map(|(i, setting)| {

@@ -11,7 +11,8 @@ use super::search::{Lead, Refined, constant, start, together};
 /// Steps of a refinement at most.
 const STEPS: usize = 12;
 
-/// What settles in the stage of an effect that changes with time, if it explains more than that effect does. `base` is the
+/// What settles in the stage of an effect that changes with time, if it explains more than that effect does, or about as much as
+/// a rate that changes. `base` is the
 /// declared model's log-likelihood.
 pub(crate) fn settling(evidence: &Evidence<'_>, changing: &Refined, base: f64) -> Option<Refined> {
     /// Log-likelihood by which it must be ahead, and a share of what is explained: no model is exact.
@@ -36,5 +37,12 @@ pub(crate) fn settling(evidence: &Evidence<'_>, changing: &Refined, base: f64) -
     let ends_s = (evidence.stretches.iter()).filter_map(|stretch| Some(stretch.rows.last()?.time_s));
     let longest_s = ends_s.fold(0.0, f64::max);
     let comes_to_rest = (values.last()).is_some_and(|time_s| (0.0..longest_s).contains(time_s));
-    (comes_to_rest && ahead > AHEAD.0.max(AHEAD.1 * changing.gain)).then_some(found)
+    // A rate that itself changes is no better known than what comes to rest.
+    let bends = effect.spec.drifts() && matches!(effect.pattern, Pattern::ByTime { .. });
+    let wins = if bends {
+        found.score() > changing.score()
+    } else {
+        ahead > AHEAD.0.max(AHEAD.1 * changing.gain)
+    };
+    (comes_to_rest && wins).then_some(found)
 }
