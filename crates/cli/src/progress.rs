@@ -24,6 +24,15 @@ enum Sink {
 impl Progress {
     /// Progress from 0 to `total`, on stderr; silent with `--quiet`.
     pub(crate) fn new(message: &str, total: u64, quiet: bool) -> Self {
+        Self::over(message, Some(total), quiet)
+    }
+
+    /// Progress of work that ends nobody knows when, on stderr: what is being done, and for how long; silent with `--quiet`.
+    pub(crate) fn open(message: &str, quiet: bool) -> Self {
+        Self::over(message, None, quiet)
+    }
+
+    fn over(message: &str, total: Option<u64>, quiet: bool) -> Self {
         Self(if quiet {
             Sink::Silent
         } else if std::io::stderr().is_terminal() {
@@ -60,12 +69,14 @@ impl Drop for Progress {
     }
 }
 
-fn bar(message: &str, total: u64) -> ProgressBar {
-    let style = ProgressStyle::with_template("{msg} {wide_bar} {pos}/{len} {eta}")
-        .expect("the template is a constant, which a test checks");
-    let bar = ProgressBar::new(total)
-        .with_style(style)
-        .with_message(message.to_owned());
+fn bar(message: &str, total: Option<u64>) -> ProgressBar {
+    let (bar, template) = match total {
+        Some(total) => (ProgressBar::new(total), "{msg} {wide_bar} {pos}/{len} {eta}"),
+        None => (ProgressBar::new_spinner(), "{spinner} {elapsed} {wide_msg}"),
+    };
+    let style =
+        ProgressStyle::with_template(template).expect("both templates are constants, which a test checks");
+    let bar = bar.with_style(style).with_message(message.to_owned());
     bar.enable_steady_tick(Duration::from_millis(200));
     bar
 }
@@ -73,7 +84,7 @@ fn bar(message: &str, total: u64) -> ProgressBar {
 #[derive(Debug)]
 struct Lines<W> {
     done: AtomicU64,
-    total: u64,
+    total: Option<u64>,
     interval: Duration,
     said: Mutex<Said<W>>,
 }
@@ -86,7 +97,7 @@ struct Said<W> {
 }
 
 impl<W: Write> Lines<W> {
-    fn new(to: W, message: &str, total: u64, interval: Duration) -> Self {
+    fn new(to: W, message: &str, total: Option<u64>, interval: Duration) -> Self {
         let said = Said {
             to,
             message: message.to_owned(),
@@ -103,19 +114,30 @@ impl<W: Write> Lines<W> {
     fn tick(&self, units: u64) {
         let done = units + self.done.fetch_add(units, Ordering::Relaxed);
         // Whoever finds the lock taken has nothing to add to what is being said.
-        let Ok(mut said) = self.said.try_lock() else {
-            return;
-        };
-        if said.at.elapsed() >= self.interval {
-            said.at = Instant::now();
-            let line = format!("{}: {done} of {}", said.message, self.total);
-            write_line(&mut said.to, &line);
+        if let Ok(mut said) = self.said.try_lock() {
+            self.say(&mut said, done);
         }
     }
 
     fn message(&self, message: &str) {
         let mut said = self.said.lock().unwrap_or_else(PoisonError::into_inner);
         message.clone_into(&mut said.message);
+        if self.total.is_none() {
+            self.say(&mut said, 0);
+        }
+    }
+
+    /// A line, if the last one was said long enough ago.
+    fn say(&self, said: &mut Said<W>, done: u64) {
+        if said.at.elapsed() < self.interval {
+            return;
+        }
+        said.at = Instant::now();
+        let line = match self.total {
+            Some(total) => format!("{}: {done} of {total}", said.message),
+            None => said.message.clone(),
+        };
+        write_line(&mut said.to, &line);
     }
 }
 
@@ -134,7 +156,7 @@ mod tests {
 
     #[test]
     fn lines_count_and_carry_the_message() {
-        let lines = Lines::new(Vec::new(), "driving", 3, Duration::ZERO);
+        let lines = Lines::new(Vec::new(), "driving", Some(3), Duration::ZERO);
         lines.tick(1);
         lines.message("comparing");
         lines.tick(2);
@@ -142,8 +164,16 @@ mod tests {
     }
 
     #[test]
+    fn lines_without_an_end_say_what_is_done() {
+        let lines = Lines::new(Vec::new(), "naming", None, Duration::ZERO);
+        lines.message("naming: wheel-scale");
+        assert_eq!(said(lines), "naming: wheel-scale\n");
+        Progress(Sink::Bar(bar("naming", None))).message("naming: slip-level");
+    }
+
+    #[test]
     fn lines_keep_quiet_for_their_interval() {
-        let lines = Lines::new(Vec::new(), "driving", 1000, INTERVAL);
+        let lines = Lines::new(Vec::new(), "driving", Some(1000), INTERVAL);
         (0..1000).for_each(|_| lines.tick(1));
         assert_eq!(lines.done.load(Ordering::Relaxed), 1000);
         assert_eq!(said(lines), "");
@@ -151,7 +181,7 @@ mod tests {
 
     #[test]
     fn threads_lose_no_tick() {
-        let lines = Lines::new(Vec::new(), "driving", 4000, Duration::ZERO);
+        let lines = Lines::new(Vec::new(), "driving", Some(4000), Duration::ZERO);
         std::thread::scope(|scope| {
             for _ in 0..4 {
                 scope.spawn(|| (0..1000).for_each(|_| lines.tick(1)));
@@ -162,7 +192,7 @@ mod tests {
 
     #[test]
     fn the_template_of_the_bar_is_well_formed() {
-        let progress = Progress(Sink::Bar(bar("driving", 2)));
+        let progress = Progress(Sink::Bar(bar("driving", Some(2))));
         progress.tick(2);
         progress.message("comparing");
         Progress::new("silent", 1, true).tick(1);

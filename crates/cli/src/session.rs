@@ -34,6 +34,11 @@ impl Session {
         Progress::new(message, total, self.global.quiet)
     }
 
+    /// Progress of work that ends nobody knows when.
+    pub(crate) fn open_progress(&self, message: &str) -> Progress {
+        Progress::open(message, self.global.quiet)
+    }
+
     /// The manifest of a folder that is complete now.
     pub(crate) fn manifest(&self, configuration: Value, inputs: Vec<Input>) -> Manifest {
         Manifest {

@@ -18,3 +18,6 @@ pub use error::Error;
 pub use laps::{Atlas, Baselines, FourNumbers, LapDiagnosis, Quadratic, Rival, Simulate, separations};
 pub use log::{Channel, Decided, LogDiagnosis, LogRow, diagnose_logs, log_separation};
 pub use response_fit::{Estimate, ResponseFit};
+
+/// Is told what is being tried, in words for a reader who waits.
+pub type Watch<'a> = dyn Fn(&str) + Sync + 'a;

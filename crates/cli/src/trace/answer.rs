@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use anyhow::Result;
 use diagnose::{
-    Answer, Atlas, Explanation, FourNumbers, LogDiagnosis, LogRow, Simulate, Verdict, diagnose_logs,
+    Answer, Atlas, Explanation, FourNumbers, LogDiagnosis, LogRow, Simulate, Verdict, Watch, diagnose_logs,
 };
 use sim::{Pattern, Setting, Vec2, WheelSpeeds};
 use track::Lap;
@@ -47,7 +47,8 @@ fn rows_of(run: &RunFile) -> Option<Vec<LogRow>> {
     Some((0..run.rows.t_s.len()).map(row).collect())
 }
 
-/// The stage-wise diagnosis of the logs, then what the laps say of it; the logs are those of the runs `logged` among all.
+/// The stage-wise diagnosis of the logs, then what the laps say of it; the logs are those of the runs `logged` among all, and
+/// `watch` is told what is being tried.
 pub(crate) fn from_logs(
     setup: &Setup,
     rows: &[Vec<LogRow>],
@@ -55,9 +56,11 @@ pub(crate) fn from_logs(
     atlas: &Atlas,
     simulate: &Simulate<'_>,
     laps: &[Vec<Lap>],
+    watch: &Watch<'_>,
 ) -> Result<FromLogs> {
     let runs: Vec<&[LogRow]> = rows.iter().map(Vec::as_slice).collect();
-    let mut logs = diagnose_logs(&setup.model, &setup.scene, &runs)?;
+    let mut logs = diagnose_logs(&setup.model, &setup.scene, &runs, watch)?;
+    watch("whether the laps agree");
     spread(&mut logs.answer, &logged, laps.len());
     let (before, after) = atlas.confirm(simulate, laps, &logs.answer.settings())?;
     // Where the logs claim nothing there is nothing to agree with.

@@ -119,25 +119,33 @@ impl Trace {
         let baselines = logged.is_none().then(|| atlas.baselines(&laps)).transpose()?;
         let slip_level = recordings[0].config.slip.level;
         let doubted = |answer: Answer| answer.unless_stalls(slip_level);
-        let progress = session.progress("naming the effect", 1);
+        let progress = session.open_progress("naming the effect");
+        let watch = |what: &str| progress.message(&format!("naming the effect: {what}"));
         let (residual, answer, from_logs) = match logged {
             Some((place, rows)) => {
                 let first = recordings[place].first_run;
                 let own = first..first + rows.len();
-                let found = from_logs(&recordings[place].setup, &rows, own, &atlas, &simulate, &laps);
+                let found = from_logs(
+                    &recordings[place].setup,
+                    &rows,
+                    own,
+                    &atlas,
+                    &simulate,
+                    &laps,
+                    &watch,
+                );
                 interrupt::check()?;
                 let found = found?;
                 (found.before, doubted(found.answer()), Some(found))
             }
             None => {
-                let found = atlas.diagnose(&simulate, &laps);
+                let found = atlas.diagnose(&simulate, &laps, &watch);
                 interrupt::check()?;
                 let found = found?;
                 (found.residual, doubted(found.answer), None)
             }
         };
-        progress.tick(1);
-        drop(progress);
+        progress.message("simulating the error before and after");
         let errors = errors(&recordings, &answer, unseen, seed)?;
         interrupt::check()?;
         let mut trace = Self {

@@ -11,7 +11,7 @@ use super::screen::Screened;
 use super::search::{Found, Search, candidates, sort};
 use super::tests_of_fit::{FourNumbers, SIGNIFICANT_P};
 use crate::answer::{ALTERNATIVE, indistinguishable};
-use crate::{Answer, Cause, Error, Explanation, Verdict};
+use crate::{Answer, Cause, Error, Explanation, Verdict, Watch};
 
 /// Score of the best probe from which a data set counts as departing from the declared model, whatever the omnibus says.
 pub(super) const ALARM_SCORE: f64 = 7.0;
@@ -93,11 +93,16 @@ pub struct LapDiagnosis {
 }
 
 impl Atlas {
-    /// What the laps of several runs tell about the declared model.
+    /// What the laps of several runs tell about the declared model; `watch` is told what is being tried.
     ///
     /// # Errors
     /// Runs of fewer than three laps, or of another shape than the atlas was made for.
-    pub fn diagnose(&self, simulate: &Simulate<'_>, runs: &[Vec<track::Lap>]) -> Result<LapDiagnosis, Error> {
+    pub fn diagnose(
+        &self,
+        simulate: &Simulate<'_>,
+        runs: &[Vec<track::Lap>],
+        watch: &Watch<'_>,
+    ) -> Result<LapDiagnosis, Error> {
         let memo = Memo::new(simulate, &self.spent);
         let simulate: &Simulate<'_> = &|effects, set| memo.simulate(effects, set);
         let data = self.observed(runs)?;
@@ -110,6 +115,7 @@ impl Atlas {
             data: &data,
             residual: &residual,
             runs,
+            watch,
         };
         let ripple = search.ripple(&Hypothesis { parts: Vec::new() });
         let alarm = numbers.omnibus_p() < ALARM_P || self.best_score(&residual) > ALARM_SCORE;
@@ -137,6 +143,7 @@ impl Atlas {
         if verdict != Verdict::Unexplained
             && let Some(answer) = found.first_mut()
         {
+            watch(&format!("the size of {}", answer.explanation.label()));
             let look = self.look_closely(simulate, &data, &answer.hypothesis, &answer.errors);
             let explanation = &mut answer.explanation;
             explanation.effects = candidates(self, &look.found, &look.errors, explanation.gain);

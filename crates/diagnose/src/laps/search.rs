@@ -2,6 +2,7 @@
 //! without a name.
 
 use std::collections::BTreeSet;
+use std::fmt::Arguments;
 use std::ops::Range;
 
 use rayon::prelude::*;
@@ -16,7 +17,7 @@ use super::ripple::Ripple;
 use super::screen::Screened;
 use super::simulated::FINAL_SETS;
 use super::tests_of_fit::{FourNumbers, HOPELESS_P, Quadratic, SIGNIFICANT_P};
-use crate::{Candidate, Explanation};
+use crate::{Candidate, Explanation, Watch};
 
 /// An explanation and what simulates it.
 #[derive(Debug, Clone)]
@@ -41,6 +42,7 @@ pub(super) struct Search<'a> {
     pub(super) residual: &'a White,
     /// The laps of each run.
     pub(super) runs: &'a [Vec<track::Lap>],
+    pub(super) watch: &'a Watch<'a>,
 }
 
 /// Rounds of a descent, each with the log-likelihood, and the share of the best one's, by which what lies behind then does
@@ -172,6 +174,10 @@ impl Search<'_> {
 
     fn scan(&self, probe: usize) -> Option<Found> {
         let nothing = self.atlas.at_rest(Hypothesis { parts: Vec::new() });
+        self.tell(format_args!(
+            "every size of {}",
+            self.atlas.probes[probe].spec.name
+        ));
         let (_, hunt) = (self.atlas).hunt(self.simulate, self.data, &nothing, probe)?;
         let found = self.atlas.hunted(self.simulate, self.data, &hunt)?;
         let end = Descent::start(self.atlas, &found);
@@ -200,6 +206,8 @@ impl Search<'_> {
                 .jumping()
                 .filter(|&probe| self.atlas.probes[probe].spec != spec)
             {
+                let name = self.atlas.probes[probe].spec.name;
+                self.tell(format_args!("every size of {name} beside {}", spec.name));
                 hunts.extend(self.atlas.hunt(self.simulate, self.data, &base, probe));
             }
         }
@@ -260,6 +268,7 @@ impl Search<'_> {
     /// effects with what explains their remainder best.
     pub(super) fn pairs(&self, singles: &[Found]) -> Vec<Found> {
         const PAIRS: usize = 5;
+        self.tell(format_args!("which two effects go together"));
         let screened = self.atlas.screen_pairs(self.residual, PAIRS);
         let mut starts: Vec<Hypothesis> = screened.into_iter().map(|pair| pair.hypothesis).collect();
         for single in of_other_effects(singles.iter()).into_iter().take(BASES) {
@@ -280,6 +289,7 @@ impl Search<'_> {
         const PROMISING: f64 = 5.0;
         const PROMISING_BESIDE: f64 = 10.0;
         let least = FAIR_SHARE * faults;
+        self.tell(format_args!("what is beside {}", single.explanation.label()));
         let base = self.base(single.hypothesis.clone());
         let mut screened = self.screened_beside(&base, &single.left);
         screened.retain(|other| !stands || other.hypothesis.is_constant());
@@ -317,6 +327,7 @@ impl Search<'_> {
         let least = bases.first().map_or(0.0, |first| WORTH * score(first));
         for base in bases.into_iter().take(BASES).filter(|base| score(base) >= least) {
             let left = &base.left;
+            self.tell(format_args!("what is beside {}", base.explanation.label()));
             let base = self.base(base.hypothesis.clone());
             let further = self.beside(&base, left, &starts);
             starts.extend(further);
@@ -386,6 +397,7 @@ impl Search<'_> {
     /// Causes without a name: the groups of basis functions that explain most with fewest coefficients, those that come near
     /// the best found so far tried to the end.
     pub(super) fn unnamed(&self, found: &[Found]) -> Vec<Found> {
+        self.tell(format_args!("causes without a name"));
         let starts = self.atlas.screen_groups(self.simulate, self.residual);
         self.settle(self.descend(starts.iter(), &ROUNDS_OF_GROUPS, near(found)))
     }
@@ -401,6 +413,7 @@ impl Search<'_> {
     /// An explanation with a cause without a name in place of an effect whose size is not steady but settles while a run goes
     /// on, tried to the end.
     pub(super) fn settling(&self, best: &Found) -> Vec<Found> {
+        self.tell(format_args!("whether {} holds still", best.explanation.label()));
         let of_part = |part: usize| {
             let settling = self
                 .atlas
@@ -430,6 +443,7 @@ impl Search<'_> {
     pub(super) fn ripple(&self, others: &Hypothesis) -> Option<Ripple> {
         /// Probability below which it is not.
         const NO_CHANCE_P: f64 = 1e-5;
+        self.tell(format_args!("how laps ripple"));
         let ripple = self.atlas.ripple(self.simulate, self.runs, others);
         ripple.filter(|ripple| ripple.p() < NO_CHANCE_P)
     }
@@ -472,6 +486,10 @@ impl Search<'_> {
             .map(|start| Descent::start(self.atlas, start))
             .collect();
         for &(round, behind, share) in rounds {
+            if alive.is_empty() {
+                break;
+            }
+            self.tell(format_args!("{}", self.in_words(&alive)));
             alive = (alive.into_par_iter())
                 .filter_map(|descent| self.atlas.descend(self.simulate, self.data, descent, round))
                 .collect();
@@ -497,6 +515,31 @@ impl Search<'_> {
             }
         }
         alive
+    }
+
+    /// The effects that are descended from, a few by name.
+    fn in_words(&self, alive: &[Descent]) -> String {
+        const NAMED: usize = 3;
+        let mut all: Vec<String> = Vec::new();
+        for descent in alive {
+            let names = (descent.hypothesis.parts.iter()).map(|part| self.atlas.probes[part.probe].spec.name);
+            let name = names.collect::<Vec<_>>().join(" + ");
+            if !all.contains(&name) {
+                all.push(name);
+            }
+        }
+        let others = all.len().saturating_sub(NAMED);
+        all.truncate(NAMED);
+        let named = all.join(", ");
+        if others > 0 {
+            format!("{named} and {others} more")
+        } else {
+            named
+        }
+    }
+
+    fn tell(&self, what: Arguments<'_>) {
+        (self.watch)(&what.to_string());
     }
 
     /// Descents, best first, without those that came to where a better one is.

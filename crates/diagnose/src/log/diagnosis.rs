@@ -24,8 +24,9 @@ use super::settling::settling;
 use super::steps::reading_step;
 use super::wheels::out_of_round;
 use crate::answer::{ALTERNATIVE, indistinguishable};
+use crate::candidate::label;
 use crate::corners::{Corners, EXACT};
-use crate::{Answer, Candidate, Cause, Detectable, Error, Explanation, Verdict};
+use crate::{Answer, Candidate, Cause, Detectable, Error, Explanation, Verdict, Watch};
 
 /// How white the filter's innovations of one measured number are.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -59,12 +60,19 @@ pub struct LogDiagnosis {
     pub detectable: Vec<Detectable>,
 }
 
-/// What the robot's logs say that the model lacks. Runs are rows in time order, from the run's start.
+/// What the robot's logs say that the model lacks. Runs are rows in time order, from the run's start; `watch` is told what is
+/// being tried.
 ///
 /// # Errors
 /// A model that the scene was not made for; logs of which no stretch of 200 control steps with positions and commands
 /// can be followed.
-pub fn diagnose_logs(model: &Model, scene: &Scene, runs: &[&[LogRow]]) -> Result<LogDiagnosis, Error> {
+pub fn diagnose_logs(
+    model: &Model,
+    scene: &Scene,
+    runs: &[&[LogRow]],
+    watch: &Watch<'_>,
+) -> Result<LogDiagnosis, Error> {
+    watch("the controller");
     let decide = decided(model, runs);
     let mut wide = model.clone();
     // Rays a little longer than the range tell how far beyond it a wall is.
@@ -76,12 +84,14 @@ pub fn diagnose_logs(model: &Model, scene: &Scene, runs: &[&[LogRow]]) -> Result
     if declared.stretches.is_empty() {
         return Err(Error::NoLog);
     }
+    watch("where the walls are cut");
     let first = recut(&scene, &wide, &declared, &[]).and_then(|found| found.cut);
     let mut search = Search::new(
         declared.elsewhere(first.as_ref().map_or(&scene, |found| &found.1)),
         step,
     )?;
     let corners = |cut: &Option<(Corners, Scene)>| cut.as_ref().map_or(EXACT, |found| found.0);
+    watch("each effect by the log");
     let Some(leads) = search.alone() else {
         return Ok(search.answer(decide, corners(&first)));
     };
@@ -89,8 +99,16 @@ pub fn diagnose_logs(model: &Model, scene: &Scene, runs: &[&[LogRow]]) -> Result
     let clear = search.evidence.clear_with_each(search.rivals());
     let was_clear = clear.is_none();
     if let Some(clear) = clear {
+        watch(&format!(
+            "the readings that count with {}",
+            search.best_in_words()
+        ));
         search = search.renewed(clear)?;
     }
+    watch(&format!(
+        "where the walls are cut with {}",
+        search.best_in_words()
+    ));
     // A large effect blurs where the corners are: they are looked for again beside the best candidate, with the size that it has
     // there and, as corners that are wrong spoil that too, with the one that it has between the declared walls.
     let uncut = search.evidence.elsewhere(&scene);
@@ -102,6 +120,7 @@ pub fn diagnose_logs(model: &Model, scene: &Scene, runs: &[&[LogRow]]) -> Result
         .filter_map(|settings| recut(&scene, &wide, &uncut, &settings))
         .max_by(|a, b| a.log_likelihood.total_cmp(&b.log_likelihood))
         .and_then(|found| found.cut);
+    watch(&format!("what is beside {}", search.best_in_words()));
     if was_clear && corners(&again) == corners(&first) {
         search.finish(&leads);
         return Ok(search.answer(decide, corners(&first)));
@@ -289,6 +308,11 @@ impl<'a> Search<'a> {
     /// The effects of the best candidate; none if there is none.
     fn best(&self) -> &[Setting] {
         self.found.first().map_or(&[], |best| &best.settings)
+    }
+
+    fn best_in_words(&self) -> String {
+        let labels: Vec<String> = self.best().iter().map(label).collect();
+        labels.join(" + ")
     }
 
     /// The effects of the best candidates, which may change places where other readings count.
