@@ -144,6 +144,11 @@ impl Measured {
         self.runs.iter().map(SampledRun::cluster).collect()
     }
 
+    /// When and where the robot was seen in a run, s and m.
+    pub(crate) fn seen(&self, run: usize) -> impl Iterator<Item = (f64, Vec2)> {
+        seen(&self.set.runs[run])
+    }
+
     /// The observed positions of one kept lap, for drawing, m.
     pub(crate) fn path(&self, run: usize, lap: usize) -> Vec<[f64; 2]> {
         let lap = &self.runs[run].laps[lap];
@@ -158,16 +163,16 @@ impl Measured {
     }
 }
 
+/// Times in s and positions in m where the robot was seen.
+fn seen(run: &RunFile) -> impl Iterator<Item = (f64, Vec2)> {
+    let rows = run.rows.t_s.iter().zip(&run.rows.position_m);
+    rows.filter_map(|(&time_s, position)| position.map(|[x, y]| (time_s, Vec2::new(x, y))))
+}
+
 fn sample(set: &DataSet, run: &RunFile, circuit: &Circuit, way: Way) -> Result<SampledRun> {
     let mut tracker = LapTracker::new(&circuit.gates, way);
-    let seen = run
-        .rows
-        .t_s
-        .iter()
-        .zip(&run.rows.position_m)
-        .filter_map(|(t, p)| p.map(|p| (*t, p)));
-    let whole: Vec<Lap> = seen
-        .filter_map(|(t, [x, y])| tracker.push(t, Vec2::new(x, y)))
+    let whole: Vec<Lap> = seen(run)
+        .filter_map(|(time_s, position)| tracker.push(time_s, position))
         .collect();
     let began_s = run.rows.t_s.first().copied().unwrap_or_default();
     let sampled = SampledRun::new(&set.name, &run.name, &whole, set.laps, began_s);

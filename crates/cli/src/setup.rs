@@ -4,12 +4,13 @@ use std::path::Path;
 use std::sync::Arc;
 
 use anyhow::{Context, Result, anyhow};
+use diagnose::ObservedLap;
 use sim::{
     Beam, CasterKind, Circuit, Drive, Machine, Model, Mount, Pattern, ReadingNoise, Response, Robot,
     RunRules, Scene, Setting, Step, Streams, Vec2, WallRules,
 };
 use toml::Value;
-use track::{Course, Way};
+use track::{Course, Lap, Way};
 
 use crate::args::ModelArgs;
 use crate::config::{
@@ -51,6 +52,15 @@ impl Setup {
     ) -> Result<Drive, sim::Error> {
         let world = self.scene.world(&self.model, streams.run as usize)?;
         sim::drive(&world, streams, laps, record)
+    }
+
+    /// Laps that were seen on a path of times in s and positions in m, as a diagnosis takes them.
+    pub(crate) fn observed(&self, seen: Vec<Lap>, path: &[(f64, Vec2)]) -> Vec<ObservedLap> {
+        let (gates, speed_m_s) = (
+            &self.scene.circuit().gates,
+            self.model.machine.controller.speed_m_s(),
+        );
+        ObservedLap::on_path(seen, path, gates, self.model.run.way, speed_m_s)
     }
 }
 

@@ -15,7 +15,9 @@ pub use candidate::Candidate;
 pub use corners::{Corners, other_cuts};
 pub use detectable::Detectable;
 pub use error::Error;
-pub use laps::{Atlas, Baselines, FourNumbers, LapDiagnosis, Quadratic, Rival, Simulate, separations};
+pub use laps::{
+    Atlas, Baselines, FourNumbers, LapDiagnosis, ObservedLap, Quadratic, Rival, Simulate, separations,
+};
 pub use log::{Channel, Decided, LogDiagnosis, LogRow, diagnose_logs, log_separation};
 pub use response_fit::{Estimate, ResponseFit};
 

@@ -27,6 +27,7 @@ mod gates;
 mod lap;
 mod midline;
 mod numeric;
+mod smooth;
 mod spline;
 #[cfg(test)]
 mod testing;
@@ -38,5 +39,6 @@ pub use flatten::{Chain, Vertex};
 pub use gates::{Gate, Gates, Way};
 pub use lap::{Lap, LapTracker, laps};
 pub use parry2d::math::Vector as Vec2;
+pub use smooth::moving_mean;
 pub use spline::Spline;
 pub use wall::{Nearest, Wall};

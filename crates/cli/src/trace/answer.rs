@@ -4,10 +4,10 @@ use std::ops::Range;
 
 use anyhow::Result;
 use diagnose::{
-    Answer, Atlas, Explanation, FourNumbers, LogDiagnosis, LogRow, Simulate, Verdict, Watch, diagnose_logs,
+    Answer, Atlas, Explanation, FourNumbers, LogDiagnosis, LogRow, ObservedLap, Simulate, Verdict, Watch,
+    diagnose_logs,
 };
 use sim::{Pattern, Setting, Vec2, WheelSpeeds};
-use track::Lap;
 
 use crate::dataset::{DataSet, RunFile};
 use crate::setup::Setup;
@@ -55,7 +55,7 @@ pub(crate) fn from_logs(
     logged: Range<usize>,
     atlas: &Atlas,
     simulate: &Simulate<'_>,
-    laps: &[Vec<Lap>],
+    laps: &[Vec<ObservedLap>],
     watch: &Watch<'_>,
 ) -> Result<FromLogs> {
     let runs: Vec<&[LogRow]> = rows.iter().map(Vec::as_slice).collect();

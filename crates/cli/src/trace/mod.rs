@@ -15,7 +15,7 @@ use std::ops::Range;
 use std::path::Path;
 
 use anyhow::{Result, ensure};
-use diagnose::{Answer, Atlas, Baselines, Detectable, FourNumbers, Simulate};
+use diagnose::{Answer, Atlas, Baselines, Detectable, FourNumbers, ObservedLap, Simulate};
 use sim::Setting;
 
 use answer::{FromLogs, from_logs, log_rows};
@@ -95,7 +95,7 @@ impl Trace {
         let seed = session.seed();
         let simulate =
             |effects: &[Setting], set: u64| simulate_all(&recordings, effects, Seeds { session: seed, set });
-        let laps: Vec<Vec<track::Lap>> = recordings.iter().flat_map(Recording::laps).collect();
+        let laps: Vec<Vec<ObservedLap>> = recordings.iter().flat_map(Recording::laps).collect();
         let few = laps.iter().position(|run| run.len() < 3);
         ensure!(
             few.is_none(),

@@ -1,9 +1,8 @@
 //! The experiment that would tell apart what these data do not.
 
 use anyhow::Result;
-use diagnose::{Candidate, Explanation, LogRow, Rival, log_separation, separations};
+use diagnose::{Candidate, Explanation, LogRow, ObservedLap, Rival, log_separation, separations};
 use sim::{Controller, Setting, Stage, Step, Streams};
-use track::Lap;
 
 use super::Trace;
 use super::answer::rivals;
@@ -152,7 +151,7 @@ fn by_laps(
     others: &[&Explanation],
     seed: u64,
 ) -> Option<Vec<(String, f64)>> {
-    let simulate = |effects: &[Setting], set: u64| -> Option<Vec<Vec<Lap>>> {
+    let simulate = |effects: &[Setting], set: u64| -> Option<Vec<Vec<ObservedLap>>> {
         let anywhere = |number| RunPlace { number, start: None };
         let runs = (0..RUNS).map(|run| (LAPS, anywhere(run)));
         Recording::drive(setup, effects, Seeds { session: seed, set }, runs)

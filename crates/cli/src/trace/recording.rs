@@ -3,7 +3,8 @@
 use std::path::Path;
 
 use anyhow::{Context, Result, ensure};
-use sim::{Setting, Start, Streams};
+use diagnose::ObservedLap;
+use sim::{Setting, Start, Step, Streams};
 use track::Lap;
 
 use crate::config::{Config, ModelFile};
@@ -82,8 +83,12 @@ impl Recording {
     }
 
     /// The laps, run by run.
-    pub(super) fn laps(&self) -> Vec<Vec<Lap>> {
-        self.measured.runs.iter().map(|run| run.laps.clone()).collect()
+    pub(super) fn laps(&self) -> Vec<Vec<ObservedLap>> {
+        let observed = |(i, run): (usize, &SampledRun)| {
+            let path: Vec<_> = self.measured.seen(i).collect();
+            self.setup.observed(run.laps.clone(), &path)
+        };
+        self.measured.runs.iter().enumerate().map(observed).collect()
     }
 
     /// Whether the declared model does the same in every run, wherever the run starts.
@@ -104,7 +109,7 @@ impl Recording {
     }
 
     /// One simulated data set of this one's shape; `None` where a run does not complete its laps.
-    pub(super) fn simulate(&self, effects: &[Setting], seeds: Seeds) -> Option<Vec<Vec<Lap>>> {
+    pub(super) fn simulate(&self, effects: &[Setting], seeds: Seeds) -> Option<Vec<Vec<ObservedLap>>> {
         self.simulate_at(self.places(effects), &self.setup, effects, seeds)
     }
 
@@ -114,7 +119,7 @@ impl Recording {
         setup: &Setup,
         effects: &[Setting],
         seeds: Seeds,
-    ) -> Option<Vec<Vec<Lap>>> {
+    ) -> Option<Vec<Vec<ObservedLap>>> {
         self.simulate_at(self.places(&[]), setup, effects, seeds)
     }
 
@@ -124,7 +129,7 @@ impl Recording {
         setup: &Setup,
         effects: &[Setting],
         seeds: Seeds,
-    ) -> Option<Vec<Vec<Lap>>> {
+    ) -> Option<Vec<Vec<ObservedLap>>> {
         Self::drive(setup, effects, seeds, self.shape().into_iter().zip(places))
     }
 
@@ -134,7 +139,7 @@ impl Recording {
         effects: &[Setting],
         seeds: Seeds,
         runs: impl Iterator<Item = (usize, RunPlace)>,
-    ) -> Option<Vec<Vec<Lap>>> {
+    ) -> Option<Vec<Vec<ObservedLap>>> {
         if interrupt::check().is_err() {
             return None;
         }
@@ -146,11 +151,13 @@ impl Recording {
                 seed: seeds.of_fit(),
                 run: run as u64,
             };
-            let drive = sim::drive_from(&world, streams, place.start, laps, |_| {}).ok()?;
+            let mut path = Vec::new();
+            let record = |step: &Step| path.push((step.time_s, step.observed));
+            let drive = sim::drive_from(&world, streams, place.start, laps, record).ok()?;
             let closed: Vec<Lap> = (drive.laps.into_iter())
                 .filter(|lap| lap.missed.is_empty())
                 .collect();
-            (closed.len() == laps).then_some(closed)
+            (closed.len() == laps).then(|| setup.observed(closed, &path))
         };
         runs.enumerate().map(run).collect()
     }
@@ -175,7 +182,7 @@ pub(super) fn simulate_all(
     recordings: &[Recording],
     effects: &[Setting],
     seeds: Seeds,
-) -> Option<Vec<Vec<Lap>>> {
+) -> Option<Vec<Vec<ObservedLap>>> {
     let parts = (recordings.iter()).map(|recording| recording.simulate(effects, seeds));
     Some(parts.collect::<Option<Vec<_>>>()?.concat())
 }

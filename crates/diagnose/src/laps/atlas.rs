@@ -10,6 +10,7 @@ use sim::Setting;
 
 use super::expectation::{Expectation, Scatter};
 use super::layout::Layout;
+use super::observed::ObservedLap;
 use super::probe::{Probe, probes};
 use super::summary::{BLOCKS, Summary};
 use crate::Error;
@@ -17,7 +18,7 @@ use crate::Error;
 /// Simulates one data set of the measured one's shape: laps of each run, or `None` where a run crashes or stops.
 ///
 /// The same number gives the same draws whatever the effects, so differences between effects are theirs alone.
-pub type Simulate<'a> = dyn Fn(&[Setting], u64) -> Option<Vec<Vec<track::Lap>>> + Sync + 'a;
+pub type Simulate<'a> = dyn Fn(&[Setting], u64) -> Option<Vec<Vec<ObservedLap>>> + Sync + 'a;
 
 /// Data sets simulated with the declared model.
 pub(super) const NULL_SETS: u64 = 200;
@@ -70,7 +71,7 @@ impl Clone for Spent {
 impl Atlas {
     /// Changes whenever the numbers of an atlas of the same model mean something else: atlases of another recipe are not to be
     /// read.
-    pub const RECIPE: u32 = 2;
+    pub const RECIPE: u32 = 3;
 
     /// Simulates everything for one recording; `cuts` simulate the declared model with walls that another program may have
     /// cut, which is no departure from it; `alike` says whether the declared model does the same in every run. `tick` is called
@@ -271,7 +272,7 @@ impl Atlas {
     }
 
     /// Whether data have the shape that the atlas was made for, run by run.
-    pub(super) fn observed(&self, runs: &[Vec<track::Lap>]) -> Result<Expectation, Error> {
+    pub(super) fn observed(&self, runs: &[Vec<ObservedLap>]) -> Result<Expectation, Error> {
         let counts: Vec<usize> = self.layout.laps.iter().map(Vec::len).collect();
         let shaped = runs
             .iter()
@@ -284,7 +285,7 @@ impl Atlas {
     /// What the data say without one run, which is one of several of its recording.
     pub(super) fn observed_without(
         &self,
-        runs: &[Vec<track::Lap>],
+        runs: &[Vec<ObservedLap>],
         run: usize,
     ) -> Result<Expectation, Error> {
         let recording = self.layout.places().nth(run).map(|at| at.0);

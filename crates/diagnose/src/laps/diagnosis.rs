@@ -6,6 +6,7 @@ use super::atlas::{Atlas, Simulate};
 use super::classes::most_probable_first;
 use super::hypothesis::Hypothesis;
 use super::memo::Memo;
+use super::observed::ObservedLap;
 use super::ripple::Ripple;
 use super::screen::Screened;
 use super::search::{Found, Search, candidates, sort};
@@ -100,7 +101,7 @@ impl Atlas {
     pub fn diagnose(
         &self,
         simulate: &Simulate<'_>,
-        runs: &[Vec<track::Lap>],
+        runs: &[Vec<ObservedLap>],
         watch: &Watch<'_>,
     ) -> Result<LapDiagnosis, Error> {
         let memo = Memo::new(simulate, &self.spent);
@@ -393,7 +394,7 @@ impl Atlas {
     pub fn confirm(
         &self,
         simulate: &Simulate<'_>,
-        runs: &[Vec<track::Lap>],
+        runs: &[Vec<ObservedLap>],
         effects: &[Setting],
     ) -> Result<(FourNumbers, Option<FourNumbers>), Error> {
         let memo = Memo::new(simulate, &self.spent);

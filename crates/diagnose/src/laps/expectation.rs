@@ -497,10 +497,11 @@ mod tests {
                 let all: Vec<Recording> = few.iter().cloned().chain(shifted).collect();
                 let scatter = Scatter::near(all.iter(), 2, &other).unwrap();
                 squares += scatter.whiten_second(&draw()).norm_squared() / TIMES as f64;
-                off += (scatter.log_det_second() - 20.0 * wide.ln()) / TIMES as f64;
+                off += (scatter.log_det_second() - f64::from(2 * SECOND.div_ceil(2) as u32) * wide.ln())
+                    / TIMES as f64;
             }
-            // 20 +- 0.8 by chance; a variance known from 12 recordings costs a little.
-            assert!((squares - 20.0).abs() < 3.0, "{wide}: {squares}");
+            // 21 +- 0.8 by chance; a variance known from 12 recordings costs a little.
+            assert!((squares - SECOND as f64).abs() < 3.0, "{wide}: {squares}");
             assert!(off.abs() < 3.0, "{wide}: {off}");
         }
     }

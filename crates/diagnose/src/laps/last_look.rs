@@ -5,6 +5,7 @@ use sim::Setting;
 use super::atlas::{Atlas, Simulate};
 use super::expectation::Expectation;
 use super::hypothesis::{Freedom, Hypothesis};
+use super::observed::ObservedLap;
 use super::parabola::{Column, Local, Nearest};
 use super::refine::are_within_steps;
 use crate::Error;
@@ -85,7 +86,7 @@ impl Atlas {
     pub(super) fn leave_out(
         &self,
         simulate: &Simulate<'_>,
-        runs: &[Vec<track::Lap>],
+        runs: &[Vec<ObservedLap>],
         look: &LastLook,
     ) -> Result<Vec<Vec<Setting>>, Error> {
         let fit_without = |run: usize| {
@@ -103,7 +104,7 @@ impl Atlas {
         simulate: &Simulate<'_>,
         run: usize,
         local: &Local,
-        runs: &[Vec<track::Lap>],
+        runs: &[Vec<ObservedLap>],
         look: &LastLook,
     ) -> Result<Hypothesis, Error> {
         let (recording, place) = self.layout.places().nth(run).unwrap_or_default();

@@ -4,11 +4,11 @@ use std::collections::VecDeque;
 use std::sync::Mutex;
 
 use sim::Setting;
-use track::Lap;
 
 use super::atlas::{Simulate, Spent};
+use super::observed::ObservedLap;
 
-/// Data sets that are kept: a search goes on from where it was a moment ago. Of 80 laps and 100 gates they take 32 MB.
+/// Data sets that are kept: a search goes on from where it was a moment ago. Of 80 laps and 100 gates they take 64 MB.
 const KEPT: usize = 256;
 
 /// A simulated data set.
@@ -16,7 +16,7 @@ struct Known {
     effects: Vec<Setting>,
     set: u64,
     /// The laps of its runs; `None` where one crashes or stops.
-    runs: Option<Vec<Vec<Lap>>>,
+    runs: Option<Vec<Vec<ObservedLap>>>,
 }
 
 /// A simulation that remembers its latest data sets. It counts all that are asked for: which of them are still known depends on
@@ -38,7 +38,7 @@ impl<'a> Memo<'a> {
     }
 
     /// One data set; see [`Simulate`].
-    pub(super) fn simulate(&self, effects: &[Setting], set: u64) -> Option<Vec<Vec<Lap>>> {
+    pub(super) fn simulate(&self, effects: &[Setting], set: u64) -> Option<Vec<Vec<ObservedLap>>> {
         self.spent.add_one();
         let is_it = |known: &&Known| known.set == set && known.effects == effects;
         if let Some(known) = self.known().iter().find(is_it) {

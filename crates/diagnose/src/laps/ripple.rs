@@ -7,10 +7,10 @@ use std::f64::consts::TAU;
 
 use nalgebra::DVector;
 use rayon::prelude::*;
-use track::Lap;
 
 use super::atlas::{Atlas, Simulate};
 use super::hypothesis::{Hypothesis, Part};
+use super::observed::ObservedLap;
 use super::summary::{BLOCKS, deviations, lap_vector};
 use super::tests_of_fit::Quadratic;
 
@@ -72,7 +72,7 @@ impl Atlas {
     pub(super) fn ripple(
         &self,
         simulate: &Simulate<'_>,
-        runs: &[Vec<Lap>],
+        runs: &[Vec<ObservedLap>],
         others: &Hypothesis,
     ) -> Option<Ripple> {
         let expected = self.spectra(simulate, others, SETS)?;
@@ -135,7 +135,7 @@ fn mean(spectra: &[DVector<f64>]) -> DVector<f64> {
 
 /// Log power of how laps deviate sideways from the means of their run's quarters, from [`LEAST_CYCLES`] cycles per lap to one in
 /// two gates.
-fn spectrum(runs: &[Vec<Lap>]) -> DVector<f64> {
+fn spectrum(runs: &[Vec<ObservedLap>]) -> DVector<f64> {
     let vectors: Vec<Vec<DVector<f64>>> = (runs.iter())
         .map(|laps| laps.iter().map(lap_vector).collect())
         .collect();
@@ -177,8 +177,8 @@ mod tests {
     use super::*;
 
     /// Laps of 100 gates, each a wave with a phase of its own.
-    fn waves(cycles: f64, amplitude_m: f64) -> Vec<Vec<Lap>> {
-        let lap = |number: usize| Lap {
+    fn waves(cycles: f64, amplitude_m: f64) -> Vec<Vec<ObservedLap>> {
+        let lap = |number: usize| track::Lap {
             start_s: 70.0 * number as f64,
             end_s: 70.0 * (number + 1) as f64,
             times_s: (0..100)
@@ -192,7 +192,7 @@ mod tests {
                 .collect(),
             missed: Vec::new(),
         };
-        vec![(0..16).map(lap).collect()]
+        vec![(0..16).map(lap).map(ObservedLap::exact).collect()]
     }
 
     #[test]

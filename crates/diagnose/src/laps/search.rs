@@ -12,6 +12,7 @@ use super::diagnosis::is_noise;
 use super::expectation::Expectation;
 use super::hunt::Hunt;
 use super::hypothesis::{Freedom, Hypothesis, Part, Shape};
+use super::observed::ObservedLap;
 use super::refine::{CLOSE_SETS, Descent, Round, Settled};
 use super::ripple::Ripple;
 use super::screen::Screened;
@@ -41,7 +42,7 @@ pub(super) struct Search<'a> {
     pub(super) data: &'a Expectation,
     pub(super) residual: &'a White,
     /// The laps of each run.
-    pub(super) runs: &'a [Vec<track::Lap>],
+    pub(super) runs: &'a [Vec<ObservedLap>],
     pub(super) watch: &'a Watch<'a>,
 }
 

@@ -2,11 +2,11 @@
 
 use nalgebra::DVector;
 use rayon::prelude::*;
-use track::Lap;
 
 use super::atlas::{Atlas, Simulate};
 use super::expectation::Expectation;
 use super::hypothesis::Hypothesis;
+use super::observed::ObservedLap;
 use super::summary::lap_vector;
 use super::tests_of_fit::Quadratic;
 
@@ -35,7 +35,7 @@ const SETS: u64 = 32;
 const TIMES: [f64; 7] = [1.0, 1.4, 2.0, 2.8, 4.0, 5.7, 8.0];
 
 /// Runs of laps.
-type Runs = [Vec<Lap>];
+type Runs = [Vec<ObservedLap>];
 
 impl Atlas {
     /// How the size of one effect of a hypothesis settles within the runs; `None` where the robot crashes.
@@ -52,7 +52,7 @@ impl Atlas {
     ) -> Option<Settling> {
         let settings = hypothesis.settings(self);
         let others = hypothesis.without(part).settings(self);
-        let with: Vec<Vec<Vec<Lap>>> = (0..SETS)
+        let with: Vec<Vec<Vec<ObservedLap>>> = (0..SETS)
             .into_par_iter()
             .map(|set| simulate(&settings, set))
             .collect::<Option<_>>()?;
@@ -68,7 +68,7 @@ impl Atlas {
         let settling = |laps: &f64| {
             let time_s = laps * self.lap_s();
             // Run by run: what is more than expected, the square that it has where it is the effect's all, and its variance.
-            let of_run = |(run, laps): (usize, &Vec<Lap>)| {
+            let of_run = |(run, laps): (usize, &Vec<ObservedLap>)| {
                 let contrast = contrast(laps, time_s);
                 let expected = simulated.iter().map(|sizes| sizes[run].dot(&contrast));
                 let expected = DVector::from_iterator(simulated.len(), expected);
@@ -101,14 +101,14 @@ impl Atlas {
     fn sizes_along(&self, directions: &[DVector<f64>], data: &Runs) -> Vec<DVector<f64>> {
         let of_run = |(run, (recording, _)): (usize, (usize, usize))| {
             let scatter = &self.scatter[recording];
-            let size = |lap: &Lap| directions[run].dot(&scatter.whiten(&lap_vector(lap)));
+            let size = |lap: &ObservedLap| directions[run].dot(&scatter.whiten(&lap_vector(lap)));
             DVector::from_iterator(data[run].len(), data[run].iter().map(size))
         };
         self.layout.places().enumerate().map(of_run).collect()
     }
 
     /// What an effect does to the mean lap of each run, in units of a lap's scatter.
-    fn directions_of(&self, with: &[Vec<Vec<Lap>>], without: &Expectation) -> Vec<DVector<f64>> {
+    fn directions_of(&self, with: &[Vec<Vec<ObservedLap>>], without: &Expectation) -> Vec<DVector<f64>> {
         let direction = |(run, (recording, place)): (usize, (usize, usize))| {
             let laps = with.iter().flat_map(|data| &data[run]);
             let count = laps.clone().count() as f64;
@@ -119,9 +119,14 @@ impl Atlas {
     }
 }
 
+/// Time of the middle of a lap, s.
+fn middle_s(lap: &ObservedLap) -> f64 {
+    0.5 * (lap.seen.start_s + lap.seen.end_s)
+}
+
 /// A decay over the laps of a run less what a constant and a change at a constant rate say of it.
-fn contrast(laps: &[Lap], time_s: f64) -> DVector<f64> {
-    let times: Vec<f64> = laps.iter().map(|lap| 0.5 * (lap.start_s + lap.end_s)).collect();
+fn contrast(laps: &[ObservedLap], time_s: f64) -> DVector<f64> {
+    let times: Vec<f64> = laps.iter().map(middle_s).collect();
     let n = times.len() as f64;
     let middle = times.iter().sum::<f64>() / n;
     let decay = DVector::from_iterator(times.len(), times.iter().map(|t| (-t / time_s).exp()));
@@ -135,22 +140,22 @@ fn contrast(laps: &[Lap], time_s: f64) -> DVector<f64> {
 mod tests {
     use super::*;
 
-    fn laps(n: usize) -> Vec<Lap> {
-        let lap = |i: usize| Lap {
+    fn laps(n: usize) -> Vec<ObservedLap> {
+        let lap = |i: usize| track::Lap {
             start_s: 100.0 + 70.0 * i as f64,
             end_s: 170.0 + 70.0 * i as f64,
             times_s: Vec::new(),
             offsets_m: Vec::new(),
             missed: Vec::new(),
         };
-        (0..n).map(lap).collect()
+        (0..n).map(lap).map(ObservedLap::exact).collect()
     }
 
     #[test]
     fn a_level_and_a_constant_rate_are_no_settling() {
         let laps = laps(12);
         let contrast = contrast(&laps, 150.0);
-        let steady = DVector::from_iterator(12, laps.iter().map(|lap| 3.0 - 0.02 * lap.start_s));
+        let steady = DVector::from_iterator(12, laps.iter().map(|lap| 3.0 - 0.02 * lap.seen.start_s));
         assert!(contrast.dot(&steady).abs() < 1e-12 && contrast.norm() > 0.1);
     }
 
@@ -158,8 +163,7 @@ mod tests {
     fn a_decay_projects_to_what_it_is_at_the_start() {
         let laps = laps(12);
         let contrast = contrast(&laps, 150.0);
-        let middle = |lap: &Lap| 0.5 * (lap.start_s + lap.end_s);
-        let settling = laps.iter().map(|lap| 5.0 + 2.0 * (-middle(lap) / 150.0).exp());
+        let settling = laps.iter().map(|lap| 5.0 + 2.0 * (-middle_s(lap) / 150.0).exp());
         let settling = DVector::from_iterator(12, settling);
         assert!((contrast.dot(&settling) / contrast.norm_squared() - 2.0).abs() < 1e-12);
     }

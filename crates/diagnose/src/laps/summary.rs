@@ -3,21 +3,22 @@
 use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector};
-use track::Lap;
 
 use super::layout::ramp_norm;
+use super::observed::ObservedLap;
 
 /// Blocks of gates whose durations are part of a lap's vector.
 pub(super) const BLOCKS: usize = 20;
 
 /// Numbers of second order: see [`second_order`].
-pub(super) const SECOND: usize = 20;
+pub(super) const SECOND: usize = 21;
 
-/// One lap: positions at the gates in mm, then durations of [`BLOCKS`] equal stretches in units of 10 ms.
+/// One lap by its moving mean: positions at the gates in mm, then durations of [`BLOCKS`] equal stretches in units of 10 ms.
 ///
 /// The units make all entries of similar size. A block's duration runs from gate to gate, so that it is the same for
 /// laps driven either way round.
-pub(super) fn lap_vector(lap: &Lap) -> DVector<f64> {
+pub(super) fn lap_vector(lap: &ObservedLap) -> DVector<f64> {
+    let lap = &lap.smooth;
     let gates = lap.offsets_m.len();
     let backward = gates > 1 && lap.times_s[1] > lap.times_s[gates - 1];
     // The time at the border before gate g; border `gates` closes the lap.
@@ -32,6 +33,15 @@ pub(super) fn lap_vector(lap: &Lap) -> DVector<f64> {
     DVector::from_iterator(
         gates + BLOCKS,
         lap.offsets_m.iter().map(|m| 1000.0 * m).chain(durations),
+    )
+}
+
+/// By how much the positions at the gates are off their moving mean, mm: next to nothing but what the camera adds.
+fn noise_vector(lap: &ObservedLap) -> DVector<f64> {
+    let pairs = lap.seen.offsets_m.iter().zip(&lap.smooth.offsets_m);
+    DVector::from_iterator(
+        lap.seen.offsets_m.len(),
+        pairs.map(|(seen_m, smooth_m)| 1000.0 * (seen_m - smooth_m)),
     )
 }
 
@@ -51,7 +61,7 @@ pub(super) struct Summary(pub(super) Vec<Recording>);
 impl Summary {
     /// The summary of runs of closed laps, `counts` of them in each recording; `None` if a run has fewer than three, or
     /// they have too few gates.
-    pub(super) fn new(runs: &[Vec<Lap>], counts: &[usize]) -> Option<Self> {
+    pub(super) fn new(runs: &[Vec<ObservedLap>], counts: &[usize]) -> Option<Self> {
         let mut rest = runs;
         let recordings = counts.iter().map(|&count| {
             let (own, others) = rest.split_at_checked(count)?;
@@ -74,15 +84,13 @@ pub(super) struct Recording {
 }
 
 impl Recording {
-    fn new(runs: &[Vec<Lap>]) -> Option<Self> {
-        let vectors: Vec<Vec<DVector<f64>>> = runs
-            .iter()
-            .map(|laps| laps.iter().map(lap_vector).collect())
-            .collect();
-        let finite = vectors
-            .iter()
-            .flatten()
-            .all(|lap| lap.iter().all(|x| x.is_finite()));
+    fn new(runs: &[Vec<ObservedLap>]) -> Option<Self> {
+        let of_each = |vector: fn(&ObservedLap) -> DVector<f64>| -> Vec<Vec<DVector<f64>>> {
+            let of_run = |laps: &Vec<ObservedLap>| laps.iter().map(vector).collect();
+            runs.iter().map(of_run).collect()
+        };
+        let (vectors, noise) = (of_each(lap_vector), of_each(noise_vector));
+        let finite = (vectors.iter().chain(&noise).flatten()).all(|lap| lap.iter().all(|x| x.is_finite()));
         if !finite || vectors.is_empty() || vectors.iter().any(|laps| laps.len() < 3) {
             return None;
         }
@@ -100,7 +108,7 @@ impl Recording {
             freedom += laps.len() - 2;
             summaries.push(summary);
         }
-        let second = second_order(&vectors);
+        let second = second_order(&vectors, &noise);
         Some(Self {
             runs: summaries,
             second,
@@ -128,19 +136,20 @@ fn summarise(laps: &[DVector<f64>]) -> RunSummary {
 }
 
 /// How the laps scatter, as [`SECOND`] numbers: log variance about the means of a run's quarters in 10 blocks of gates and
-/// 5 of durations; log mean square of second differences along the lap at spacing 1 and 5 gates, and log kurtosis of the
-/// first, winsorised; kurtosis and skewness of the durations.
-fn second_order(runs: &[Vec<DVector<f64>>]) -> DVector<f64> {
+/// 5 of durations; log mean square of second differences along the lap at spacing 1 and 5 gates; log mean square of what single
+/// positions are off, and its log kurtosis, winsorised; kurtosis and skewness of the durations.
+fn second_order(runs: &[Vec<DVector<f64>>], noise: &[Vec<DVector<f64>>]) -> DVector<f64> {
     let size = runs[0][0].len();
     let gates = size - BLOCKS;
     let mut squares = DVector::<f64>::zeros(size);
-    let (mut bends, mut rough5) = (Vec::new(), Moments::default());
+    let (mut rough1, mut rough5) = (Moments::default(), Moments::default());
     let mut durations = Moments::default();
     for deviation in deviations(runs) {
         squares += deviation.component_mul(&deviation);
-        bends.extend((1..gates - 1).map(|g| deviation[g - 1] - 2.0 * deviation[g] + deviation[g + 1]));
-        for g in 5..gates.saturating_sub(5) {
-            rough5.add(deviation[g - 5] - 2.0 * deviation[g] + deviation[g + 5]);
+        for (rough, spacing) in [(&mut rough1, 1), (&mut rough5, 5)] {
+            for g in spacing..gates.saturating_sub(spacing) {
+                rough.add(deviation[g - spacing] - 2.0 * deviation[g] + deviation[g + spacing]);
+            }
         }
         deviation
             .rows(gates, BLOCKS)
@@ -151,10 +160,14 @@ fn second_order(runs: &[Vec<DVector<f64>>]) -> DVector<f64> {
     let freedom = runs.iter().map(freedom).sum::<usize>() as f64;
     let variances = stretches(size)
         .map(|part| (squares.rows(part.start, part.len()).sum() / freedom / part.len() as f64).ln());
+    let noise: Vec<f64> = (deviations(noise))
+        .flat_map(|lap| lap.data.as_vec().clone())
+        .collect();
     let others = [
-        Moments::of(&bends).square().ln(),
+        rough1.square().ln(),
         rough5.square().ln(),
-        Moments::of(&winsorised(bends)).kurtosis().ln(),
+        Moments::of(&noise).square().ln(),
+        Moments::of(&winsorised(noise)).kurtosis().ln(),
         durations.kurtosis(),
         durations.skewness(),
     ];
