@@ -46,11 +46,13 @@ impl Atlas {
     pub(super) fn base(&self, simulate: &Simulate<'_>, data: &Expectation, hypothesis: Hypothesis) -> Base {
         const SETS: u64 = 10;
         const NEARLY_ALL: f64 = 0.95;
-        let excess = |from: &Expectation| self.white(data, from).norm_squared() - self.layout.len() as f64;
-        let evaluated = self.evaluate(simulate, &hypothesis, SETS);
-        let scatter = evaluated
-            .filter(|evaluated| excess(&evaluated.expectation) < (1.0 - NEARLY_ALL) * excess(&self.null))
-            .and_then(|evaluated| self.scatter_of(evaluated.summaries.iter(), 1));
+        let scatter = (self.evaluate(simulate, &hypothesis, SETS)).and_then(|evaluated| {
+            let own = self.scatter_of(evaluated.summaries.iter(), 1)?;
+            let square = |from: &Expectation| white(&own, &self.layout, data, from).norm_squared();
+            let excess = |from: &Expectation| square(from) - self.layout.len() as f64;
+            let left = excess(&evaluated.expectation);
+            (left < (1.0 - NEARLY_ALL) * excess(&self.null)).then_some(own)
+        });
         let units = scatter.as_ref().unwrap_or(&self.scatter);
         Base {
             following: self.directions(simulate, &hypothesis, units),
@@ -116,9 +118,8 @@ impl Atlas {
     ) -> Option<White> {
         let mut settings = base.hypothesis.settings(self);
         settings.extend_from_slice(further);
-        let same_draws = self.declared_mean(sets.clone());
         let found = self.simulated_plainly(simulate, &settings, sets)?;
-        Some(self.left_beyond(data, base, &found.moved(1.0, &same_draws, &self.null)))
+        Some(self.left_beyond(data, base, &found))
     }
 }
 

@@ -1,10 +1,12 @@
 //! Two probes at once, over the paths that were simulated beforehand.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
+use rayon::prelude::*;
 
 use super::atlas::{Atlas, White};
 use super::hypothesis::{Hypothesis, Part, Shape};
-use super::screen::{BEYOND, price};
+use super::screen::{BEYOND, price, tangent};
+use super::search::Search;
 
 /// A straight piece of a probe's path.
 struct Piece {
@@ -23,6 +25,8 @@ struct Piece {
 pub(super) struct ScreenedPair {
     pub(super) hypothesis: Hypothesis,
     pub(super) score: f64,
+    /// Along the paths of its probes.
+    sizes: [f64; 2],
 }
 
 impl Atlas {
@@ -62,23 +66,30 @@ impl Atlas {
                 }
             }
         }
-        let laps = self.layout.total_laps();
         let mut pairs: Vec<ScreenedPair> = best
             .into_iter()
             .map(|((a, b), (gain, sizes))| {
-                let fitted = self.probes[a].free.len() + self.probes[b].free.len();
                 let part = |probe, size| Part::screened(self, probe, Shape::Constant, &[size]);
                 let hypothesis = Hypothesis {
                     parts: vec![part(a, sizes[0]), part(b, sizes[1])],
                 };
                 ScreenedPair {
                     hypothesis,
-                    score: 0.5 * gain - price(fitted, laps) - self.choice(a) - self.choice(b),
+                    score: self.score_of_pair([a, b], 0.5 * gain),
+                    sizes,
                 }
             })
             .collect();
         pairs.sort_by(|a, b| b.score.total_cmp(&a.score));
         self.diverse(pairs, most)
+    }
+
+    /// A pair's gain less the price of its numbers and of having been chosen.
+    fn score_of_pair(&self, probes: [usize; 2], gain: f64) -> f64 {
+        let price_of = |probe: usize| {
+            price(self.probes[probe].free.len(), self.layout.total_laps()) + self.choice(probe)
+        };
+        gain - probes.map(price_of).iter().sum::<f64>()
     }
 
     /// The best pairs, of the same two effects at most two.
@@ -114,6 +125,41 @@ impl Atlas {
             along: &pair[1].1 - &pair[0].1,
         };
         nodes.windows(2).enumerate().map(piece).collect()
+    }
+}
+
+impl Search<'_> {
+    /// Pairs that were screened with the scores and sizes that simulations of both together give them, best first: actions do not quite
+    /// add up.
+    pub(super) fn heard_pairs(&self, screened: Vec<ScreenedPair>) -> Vec<ScreenedPair> {
+        let heard = |pair: ScreenedPair| self.heard_pair(pair);
+        let mut pairs: Vec<ScreenedPair> = screened.into_par_iter().filter_map(heard).collect();
+        pairs.sort_by(|a, b| b.score.total_cmp(&a.score));
+        pairs
+    }
+
+    /// A pair after one step of Gauss and Newton's method along the paths of its probes; `None` where the robot crashes.
+    fn heard_pair(&self, pair: ScreenedPair) -> Option<ScreenedPair> {
+        const SETS: u64 = 4;
+        let atlas = self.atlas;
+        let probes = [0, 1].map(|i| pair.hypothesis.parts[i].probe);
+        let nothing = atlas.at_rest(Hypothesis { parts: Vec::new() });
+        let settings = pair.hypothesis.settings(atlas);
+        let left = atlas.left_beside(self.simulate, self.data, &nothing, &settings, 0..SETS)?;
+        let [a, b] = [0, 1].map(|i| tangent(&atlas.nodes(probes[i]), pair.sizes[i]));
+        let squares = Matrix2::new(a.norm_squared(), a.dot(&b), a.dot(&b), b.norm_squared());
+        let products = Vector2::new(a.dot(&left), b.dot(&left));
+        let step = squares.try_inverse()? * products;
+        let sizes = [0, 1].map(|i| pair.sizes[i] + step[i]);
+        let part = |i: usize| Part::screened(atlas, probes[i], Shape::Constant, &[sizes[i]]);
+        let gain = 0.5 * (self.residual.norm_squared() - left.norm_squared() + step.dot(&products));
+        Some(ScreenedPair {
+            hypothesis: Hypothesis {
+                parts: vec![part(0), part(1)],
+            },
+            score: atlas.score_of_pair(probes, gain),
+            sizes,
+        })
     }
 }
 

@@ -238,7 +238,7 @@ pub(super) fn at(nodes: &[(f64, White)], size: f64) -> White {
 }
 
 /// The change of the path with the size.
-fn tangent(nodes: &[(f64, White)], size: f64) -> White {
+pub(super) fn tangent(nodes: &[(f64, White)], size: f64) -> White {
     piece(nodes, size).1
 }
 

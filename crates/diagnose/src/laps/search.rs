@@ -268,10 +268,13 @@ impl Search<'_> {
     /// The best pairs, tried to the end: those that together explain most as far as actions add up, and the best single
     /// effects with what explains their remainder best.
     pub(super) fn pairs(&self, singles: &[Found]) -> Vec<Found> {
+        /// Pairs that are simulated where they were screened.
+        const HEARD: usize = 48;
         const PAIRS: usize = 5;
         self.tell(format_args!("which two effects go together"));
-        let screened = self.atlas.screen_pairs(self.residual, PAIRS);
-        let mut starts: Vec<Hypothesis> = screened.into_iter().map(|pair| pair.hypothesis).collect();
+        let heard = self.heard_pairs(self.atlas.screen_pairs(self.residual, HEARD));
+        let best = heard.into_iter().take(PAIRS);
+        let mut starts: Vec<Hypothesis> = best.map(|pair| pair.hypothesis).collect();
         for single in of_other_effects(singles.iter()).into_iter().take(BASES) {
             let base = self.base(single.hypothesis.clone());
             let further = self.beside(&base, &single.left, &starts);
