@@ -23,28 +23,24 @@ pub fn moving_mean(path: &[(f64, Vec2)], half_width_s: f64) -> Vec<(f64, Vec2)> 
     let (Some(first), Some(last)) = (path.first(), path.last()) else {
         return Vec::new();
     };
+    // The rows of the window, whose ends only ever move on, and their sums.
     let (mut from, mut to) = (0, 0);
+    let (mut time_s, mut position) = (0.0, Vec2::ZERO);
     let mean = |row: &(f64, Vec2)| {
-        // Half a billionth more, as times are sums of steps.
+        // A billionth more, as times are sums of steps.
         let half_s = half_width_s.min(row.0 - first.0).min(last.0 - row.0) + 1e-9;
-        while row.0 - path[from].0 > half_s {
-            from += 1;
-        }
-        // Towards the end the window becomes narrower again.
         while to < path.len() && path[to].0 - row.0 <= half_s {
+            time_s += path[to].0;
+            position += path[to].1;
             to += 1;
         }
-        while path[to - 1].0 - row.0 > half_s {
-            to -= 1;
+        while row.0 - path[from].0 > half_s {
+            time_s -= path[from].0;
+            position -= path[from].1;
+            from += 1;
         }
-        while from > 0 && row.0 - path[from - 1].0 <= half_s {
-            from -= 1;
-        }
-        let rows = &path[from..to];
-        let share = 1.0 / rows.len() as f64;
-        let time_s = rows.iter().map(|row| row.0).sum::<f64>() * share;
-        let position = rows.iter().fold(Vec2::ZERO, |sum, row| sum + row.1) * share;
-        (time_s, position)
+        let share = 1.0 / (to - from) as f64;
+        (time_s * share, position * share)
     };
     path.iter().map(mean).collect()
 }

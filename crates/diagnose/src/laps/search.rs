@@ -275,12 +275,21 @@ impl Search<'_> {
         let heard = self.heard_pairs(self.atlas.screen_pairs(self.residual, HEARD));
         let best = heard.into_iter().take(PAIRS);
         let mut starts: Vec<Hypothesis> = best.map(|pair| pair.hypothesis).collect();
-        for single in of_other_effects(singles.iter()).into_iter().take(BASES) {
-            let base = self.base(single.hypothesis.clone());
-            let further = self.beside(&base, &single.left, &starts);
+        let (rounds, reached) = (&ROUNDS_OF_SEVERAL, f64::NEG_INFINITY);
+        let mut descents = self.descend_several(&starts, rounds, reached);
+        if !best_of(&descents).is_some_and(Descent::fits) {
+            let mut further = starts.clone();
+            for single in of_other_effects(singles.iter()).into_iter().take(BASES) {
+                let base = self.base(single.hypothesis.clone());
+                let beside = self.beside(&base, &single.left, &further);
+                further.extend(beside);
+            }
+            let further = further.split_off(starts.len());
+            let best = best_of(&descents).map_or(reached, |best| best.score);
+            descents.extend(self.descend_several(&further, rounds, best));
             starts.extend(further);
         }
-        self.pairs_from(&starts, &ROUNDS_OF_SEVERAL, f64::NEG_INFINITY)
+        self.with_exchanged(descents, &starts, rounds, reached)
     }
 
     /// The best pairs of a single effect that explains nearly all, tried to the end: those with what explains best what it
@@ -306,11 +315,19 @@ impl Search<'_> {
             return Vec::new();
         }
         let starts = self.beside_of(&heard, &base, &single.left, &[]);
-        self.pairs_from(&starts, &ROUNDS_BESIDE, single.explanation.score)
+        let reached = single.explanation.score;
+        let descents = self.descend_several(&starts, &ROUNDS_BESIDE, reached);
+        self.with_exchanged(descents, &starts, &ROUNDS_BESIDE, reached)
     }
 
-    fn pairs_from(&self, starts: &[Hypothesis], rounds: &Rounds, reached: f64) -> Vec<Found> {
-        let mut descents = self.descend_several(starts, rounds, reached);
+    /// Pairs with either effect of the best one exchanged for others than were tried, tried to the end.
+    fn with_exchanged(
+        &self,
+        mut descents: Vec<Descent>,
+        starts: &[Hypothesis],
+        rounds: &Rounds,
+        reached: f64,
+    ) -> Vec<Found> {
         // What leaves far too much lacks a third effect rather than another second one, and what is no better than fewer effects
         // lacks none.
         let worth_more = |best: &&Descent| best.score > reached && !best.leaves_far_too_much();
