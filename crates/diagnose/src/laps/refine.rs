@@ -473,11 +473,17 @@ impl Atlas {
 
     /// What a hypothesis pays for its fitted numbers, for the choice of its probes, and for what robots hardly do.
     fn price_of(&self, hypothesis: &Hypothesis) -> f64 {
-        /// A program's constants stay what they are while it runs: one in twenty that something drifts for another cause.
-        const DRIFTING_PROGRAM: f64 = 3.0;
+        /// A program's constants stay what they are while it runs, and an axle in every run: one in twenty that it is not another cause
+        /// that changes.
+        const CHANGING_CONSTANT: f64 = 3.0;
         let of_part = |part: &Part| {
-            let drifts = part.shape == Shape::ByTime && self.probes[part.probe].spec.stage == Stage::Decide;
-            self.choice(part.probe) + if drifts { DRIFTING_PROGRAM } else { 0.0 }
+            let spec = self.probes[part.probe].spec;
+            let changes = match part.shape {
+                Shape::Constant => false,
+                Shape::ByRun => spec.name == "axle-length",
+                Shape::ByTime => spec.name == "axle-length" || spec.stage == Stage::Decide,
+            };
+            self.choice(part.probe) + if changes { CHANGING_CONSTANT } else { 0.0 }
         };
         let parts: f64 = hypothesis.parts.iter().map(of_part).sum();
         price(hypothesis.fitted(self), self.layout.total_laps()) + parts
