@@ -7,8 +7,8 @@ use track::{Gates, Lap, Vec2, Way, laps, moving_mean};
 pub struct ObservedLap {
     /// By the positions as they were observed.
     pub seen: Lap,
-    /// By their moving mean over the distance of two gates. Between two of them a camera sees a robot about ten times: the mean has a third
-    /// of one position's noise, and is as much off in a bend for every robot.
+    /// By their moving mean over the distance between two gates. On that way a camera sees a robot about ten times: the mean
+    /// has a third of one position's noise, and is as much off in a bend for every robot.
     pub smooth: Lap,
 }
 
@@ -22,8 +22,8 @@ impl ObservedLap {
         }
     }
 
-    /// Laps that the gates saw on a path of times in s and positions in m (rows in time order), with those of its moving mean, for a robot whose program's
-    /// speed is `speed_m_s`. A lap that its moving mean does not complete is taken as it was seen.
+    /// Laps that the gates saw on a path of times in s and positions in m (rows in time order), with those of its moving mean,
+    /// for a robot whose program's speed is `speed_m_s`. A lap that its moving mean does not complete is taken as it was seen.
     pub fn on_path(
         seen: Vec<Lap>,
         path: &[(f64, Vec2)],
