@@ -42,7 +42,16 @@ impl Atlas {
         }
     }
 
-    /// A hypothesis whose numbers follow an effect beside it.
+    /// A hypothesis whose numbers follow an effect beside it, in units of the declared model's scatter.
+    pub(super) fn following(&self, simulate: &Simulate<'_>, hypothesis: Hypothesis) -> Base {
+        Base {
+            scatter: None,
+            following: self.directions(simulate, &hypothesis, &self.scatter),
+            hypothesis,
+        }
+    }
+
+    /// A hypothesis whose numbers follow an effect beside it, in units of its own scatter if it explains nearly all.
     pub(super) fn base(&self, simulate: &Simulate<'_>, data: &Expectation, hypothesis: Hypothesis) -> Base {
         const SETS: u64 = 10;
         const NEARLY_ALL: f64 = 0.95;

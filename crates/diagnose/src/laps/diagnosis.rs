@@ -1,5 +1,7 @@
 //! The answer: which effects, how sure, what else it could be.
 
+use std::sync::OnceLock;
+
 use sim::{Pattern, Setting};
 
 use super::atlas::{Atlas, Simulate};
@@ -117,6 +119,7 @@ impl Atlas {
             residual: &residual,
             runs,
             watch,
+            scanned: OnceLock::new(),
         };
         let ripple = search.ripple(&Hypothesis { parts: Vec::new() });
         let alarm = numbers.omnibus_p() < ALARM_P || self.best_score(&residual) > ALARM_SCORE;

@@ -5,7 +5,7 @@ use std::ops::Range;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::atlas::{Atlas, Simulate};
+use super::atlas::{Atlas, Simulate, White};
 use super::beside::Base;
 use super::expectation::Expectation;
 use super::hypothesis::{Hypothesis, Part};
@@ -21,50 +21,42 @@ pub(super) struct Hunt {
     size: f64,
     /// How far off it may be.
     spacing: f64,
+    /// How often sizes closer to it were looked at.
+    looks: usize,
+}
+
+impl Hunt {
+    pub(super) fn new(base: Base, probe: usize, size: f64, spacing: f64) -> Self {
+        Self {
+            base,
+            probe,
+            size,
+            spacing,
+            looks: 0,
+        }
+    }
+}
+
+/// What a probe that jumps leaves of the data at a size, by two simulations; see [`Atlas::left_beyond`].
+#[derive(Debug, Clone)]
+pub(super) struct Look {
+    pub(super) size: f64,
+    pub(super) left: [White; 2],
+}
+
+impl Look {
+    /// The squared distance of the data. If the two simulations are different data sets, their noise adds nothing to it on average.
+    pub(super) fn square(&self) -> f64 {
+        self.left[0].dot(&self.left[1])
+    }
+
+    /// What both leave on average.
+    pub(super) fn mean(&self) -> White {
+        (&self.left[0] + &self.left[1]) * 0.5
+    }
 }
 
 impl Atlas {
-    /// An effect that jumps beside a hypothesis, at sizes all over its probe's range, and the squared distance that is left.
-    /// `None` where no size explains a fair share of what the hypothesis leaves.
-    pub(super) fn hunt(
-        &self,
-        simulate: &Simulate<'_>,
-        data: &Expectation,
-        base: &Base,
-        probe: usize,
-    ) -> Option<(f64, Hunt)> {
-        const COARSE: usize = 60;
-        const FAIR_SHARE: f64 = 0.25;
-        /// Data sets at each size; two pairs where less is left to explain than so many times what chance leaves.
-        const ONE: [Range<u64>; 2] = [0..1, 0..1];
-        const PAIRS: [Range<u64>; 2] = [0..2, 2..4];
-        const LITTLE: f64 = 3.0;
-        let p = &self.probes[probe];
-        let (low, high) = (p.sizes[0], p.sizes[p.sizes.len() - 1]);
-        // Sizes in a constant ratio: what matters is how many steps fit into a speed or a reading.
-        let ratio = (high / low).powf(1.0 / (COARSE - 1) as f64);
-        let sizes: Vec<f64> = (0..COARSE).map(|i| low * ratio.powi(i as i32)).collect();
-        let without = if base.hypothesis.parts.is_empty() {
-            self.null.clone()
-        } else {
-            self.evaluate(simulate, &base.hypothesis, CLOSER[0])?.expectation
-        };
-        let chance = self.layout.len() as f64;
-        let excess = self.left_beyond(data, base, &without).norm_squared() - chance;
-        let sets = if excess < LITTLE * chance { PAIRS } else { ONE };
-        let (left, size) = least(&self.distances(simulate, data, base, probe, &sizes, &sets))?;
-        let fair = left - chance < (1.0 - FAIR_SHARE) * excess;
-        fair.then(|| {
-            let hunt = Hunt {
-                base: base.clone(),
-                probe,
-                size,
-                spacing: size * (ratio - 1.0),
-            };
-            (left, hunt)
-        })
-    }
-
     /// The hypothesis and the effect beside it, at the best of sizes ever closer to that of the hunt.
     pub(super) fn hunted(
         &self,
@@ -72,8 +64,19 @@ impl Atlas {
         data: &Expectation,
         hunt: &Hunt,
     ) -> Option<Hypothesis> {
-        let part = self.hunt_closer(simulate, data, hunt, &CLOSER)?;
+        let part = self.hunt_closer(simulate, data, hunt.clone(), &CLOSER[hunt.looks..])?;
         Some(hunt.base.hypothesis.with(&Hypothesis::of(part)))
+    }
+
+    /// A hunt after one look closer, and the squared distance that is then left.
+    pub(super) fn hunted_once(
+        &self,
+        simulate: &Simulate<'_>,
+        data: &Expectation,
+        mut hunt: Hunt,
+    ) -> Option<(f64, Hunt)> {
+        let found = self.look_closer(simulate, data, &mut hunt, CLOSER[0])?;
+        Some((least(&found)?.0, hunt))
     }
 
     /// A hypothesis whose effects that jump have better sizes beside the others, whose numbers may follow but are left as they
@@ -132,12 +135,8 @@ impl Atlas {
     fn hunt_of(&self, hypothesis: &Hypothesis, part: usize) -> Option<Hunt> {
         let base = self.at_rest(hypothesis.without(part));
         let part = &hypothesis.parts[part];
-        Some(Hunt {
-            base,
-            probe: part.probe,
-            size: part.values[0][self.probes[part.probe].size_index()],
-            spacing: part.held?,
-        })
+        let size = part.values[0][self.probes[part.probe].size_index()];
+        Some(Hunt::new(base, part.probe, size, part.held?))
     }
 
     fn hunt_each(
@@ -154,7 +153,7 @@ impl Atlas {
                 continue;
             };
             prepare(&mut hunt);
-            found.parts[i] = self.hunt_closer(simulate, data, &hunt, levels)?;
+            found.parts[i] = self.hunt_closer(simulate, data, hunt, levels)?;
         }
         Some(found)
     }
@@ -164,37 +163,49 @@ impl Atlas {
         &self,
         simulate: &Simulate<'_>,
         data: &Expectation,
-        hunt: &Hunt,
+        mut hunt: Hunt,
         levels: &[u64],
     ) -> Option<Part> {
-        let (mut best, mut spacing) = (hunt.size, hunt.spacing);
         let mut last = Vec::new();
         for &sets in levels {
-            let sizes: Vec<f64> = (-4..=4).map(|i| best + spacing * f64::from(i) / 3.0).collect();
-            last = self.distances(
-                simulate,
-                data,
-                &hunt.base,
-                hunt.probe,
-                &sizes,
-                &[0..sets, 0..sets],
-            );
-            best = least(&last)?.1;
-            spacing /= 3.0;
+            last = self.look_closer(simulate, data, &mut hunt, sets)?;
         }
         // Sizes that are no worse than by 4 in squared distance bound the answer.
         let bound = least(&last)?.0 + 4.0;
         let as_good = last
             .iter()
             .filter(|found| found.0 < bound)
-            .map(|found| (found.1 - best).abs());
-        let error = as_good.fold(spacing / 2.0, f64::max);
-        Some(Part::held(self, hunt.probe, best, error))
+            .map(|found| (found.1 - hunt.size).abs());
+        let error = as_good.fold(hunt.spacing / 2.0, f64::max);
+        Some(Part::held(self, hunt.probe, hunt.size, error))
     }
 
-    /// Squared distances of the data from a hypothesis with a probe beside it at some sizes, each with its size; sizes at
-    /// which the robot crashes are left out. A distance is told along what two simulations leave: if these are different data
-    /// sets, their noise adds nothing to it on average.
+    /// Brings a hunt to the best of sizes about its own, with so many data sets at each; what these leave of the data.
+    fn look_closer(
+        &self,
+        simulate: &Simulate<'_>,
+        data: &Expectation,
+        hunt: &mut Hunt,
+        sets: u64,
+    ) -> Option<Vec<(f64, f64)>> {
+        let sizes: Vec<f64> = (-4..=4)
+            .map(|i| hunt.size + hunt.spacing * f64::from(i) / 3.0)
+            .collect();
+        let found = self.distances(
+            simulate,
+            data,
+            &hunt.base,
+            hunt.probe,
+            &sizes,
+            &[0..sets, 0..sets],
+        );
+        hunt.size = least(&found)?.1;
+        hunt.spacing /= 3.0;
+        hunt.looks += 1;
+        Some(found)
+    }
+
+    /// Squared distances of the data from a hypothesis with a probe beside it at some sizes, each with its size; see [`Look`].
     fn distances(
         &self,
         simulate: &Simulate<'_>,
@@ -204,18 +215,35 @@ impl Atlas {
         sizes: &[f64],
         sets: &[Range<u64>; 2],
     ) -> Vec<(f64, f64)> {
-        let distance = |&size: &f64| {
+        let looks = self.looks(simulate, data, base, probe, sizes, sets);
+        looks.iter().map(|look| (look.square(), look.size)).collect()
+    }
+
+    /// What a hypothesis with a probe beside it leaves of the data at some sizes; those at which the robot crashes are left out.
+    pub(super) fn looks(
+        &self,
+        simulate: &Simulate<'_>,
+        data: &Expectation,
+        base: &Base,
+        probe: usize,
+        sizes: &[f64],
+        sets: &[Range<u64>; 2],
+    ) -> Vec<Look> {
+        let look = |&size: &f64| {
             let further = [self.probes[probe].setting(size)];
             let left = |i: usize| self.left_beside(simulate, data, base, &further, sets[i].clone());
             let first = left(0)?;
-            let square = if sets[0] == sets[1] {
-                first.norm_squared()
+            let second = if sets[0] == sets[1] {
+                first.clone()
             } else {
-                first.dot(&left(1)?)
+                left(1)?
             };
-            Some((square, size))
+            Some(Look {
+                size,
+                left: [first, second],
+            })
         };
-        sizes.par_iter().filter_map(distance).collect()
+        sizes.par_iter().filter_map(look).collect()
     }
 }
 

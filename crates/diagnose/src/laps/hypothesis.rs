@@ -142,6 +142,13 @@ impl Part {
         (self.held).is_none_or(|error| sizes.all(|(a, b)| (a - b).abs() <= error))
     }
 
+    /// Whether its numbers are another's but for what sizes that jump move beside effects that are still being fitted.
+    fn is_about(&self, other: &Self) -> bool {
+        const APART: f64 = 0.06;
+        let mut sizes = self.values.iter().flatten().zip(other.values.iter().flatten());
+        sizes.all(|(a, b)| (a - b).abs() <= APART * a.abs())
+    }
+
     /// The same with its size a multiple as far from the neutral one.
     pub(super) fn times(&self, multiple: f64, atlas: &Atlas) -> Self {
         let neutral = atlas.probes[self.probe].neutral;
@@ -408,7 +415,7 @@ impl Hypothesis {
     /// The same with the sizes of these parts where it has their effects at a size that was found by trying many.
     pub(super) fn with_held(&self, known: &[Part]) -> Self {
         let held = |part: &Part| {
-            let same = |known: &&Part| part.held.is_some() && known.probe == part.probe;
+            let same = |known: &&Part| part.held.is_some() && known.probe == part.probe && known.is_about(part);
             known.iter().find(same).unwrap_or(part).clone()
         };
         Self {

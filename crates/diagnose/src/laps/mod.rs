@@ -21,6 +21,7 @@ mod parabola;
 mod probe;
 mod refine;
 mod ripple;
+mod scans;
 mod screen;
 mod search;
 mod separation;

@@ -9,15 +9,31 @@ use super::screen::{BEYOND, price, tangent};
 use super::search::Search;
 
 /// A straight piece of a probe's path.
-struct Piece {
-    probe: usize,
+pub(super) struct Piece {
+    pub(super) probe: usize,
     from_size: f64,
     to_size: f64,
     /// Shares of the piece that are allowed.
     low: f64,
     high: f64,
-    from: White,
-    along: White,
+    pub(super) from: White,
+    pub(super) along: White,
+}
+
+impl Piece {
+    /// The squared distance to a target that the piece's best point gains, and its size, by the target's products with the piece.
+    pub(super) fn best(&self, along_target: f64, from_target: f64) -> (f64, f64) {
+        let square = self.along.norm_squared();
+        let product = along_target - self.along.dot(&self.from);
+        let share = (product / square.max(f64::MIN_POSITIVE)).clamp(self.low, self.high);
+        let gain = 2.0 * from_target - self.from.norm_squared() + share * (2.0 * product - share * square);
+        (gain, self.at(share))
+    }
+
+    /// The size at a share of the piece.
+    fn at(&self, share: f64) -> f64 {
+        self.from_size + share * (self.to_size - self.from_size)
+    }
 }
 
 /// Two probes at the sizes that together explain most.
@@ -35,10 +51,7 @@ impl Atlas {
     /// Their actions are taken to add up. Looking for both at once finds what one after the other does not: the best
     /// single explanation of two effects is often a third. Effects that jump are left out: their paths tell nothing.
     pub(super) fn screen_pairs(&self, residual: &White, most: usize) -> Vec<ScreenedPair> {
-        let pieces: Vec<Piece> = (0..self.probes.len())
-            .filter(|&probe| !self.probes[probe].jumps)
-            .flat_map(|probe| self.pieces(probe))
-            .collect();
+        let pieces = self.smooth_pieces();
         let along = DMatrix::from_columns(&pieces.iter().map(|p| p.along.clone()).collect::<Vec<_>>());
         let from = DMatrix::from_columns(&pieces.iter().map(|p| p.from.clone()).collect::<Vec<_>>());
         let products = Products {
@@ -56,8 +69,7 @@ impl Atlas {
                     continue;
                 }
                 let (gain, shares) = products.best([i, j], [a, b]);
-                let sizes = [(a, shares[0]), (b, shares[1])]
-                    .map(|(p, share)| p.from_size + share * (p.to_size - p.from_size));
+                let sizes = [a.at(shares[0]), b.at(shares[1])];
                 let entry = best
                     .entry((a.probe, b.probe))
                     .or_insert((f64::NEG_INFINITY, sizes));
@@ -85,7 +97,7 @@ impl Atlas {
     }
 
     /// A pair's gain less the price of its numbers and of having been chosen.
-    fn score_of_pair(&self, probes: [usize; 2], gain: f64) -> f64 {
+    pub(super) fn score_of_pair(&self, probes: [usize; 2], gain: f64) -> f64 {
         let price_of = |probe: usize| {
             price(self.probes[probe].free.len(), self.layout.total_laps()) + self.choice(probe)
         };
@@ -110,6 +122,14 @@ impl Atlas {
             }
         }
         kept
+    }
+
+    /// The paths of all probes that do not jump.
+    pub(super) fn smooth_pieces(&self) -> Vec<Piece> {
+        (0..self.probes.len())
+            .filter(|&probe| !self.probes[probe].jumps)
+            .flat_map(|probe| self.pieces(probe))
+            .collect()
     }
 
     fn pieces(&self, probe: usize) -> Vec<Piece> {

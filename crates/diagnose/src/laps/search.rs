@@ -4,17 +4,18 @@
 use std::collections::BTreeSet;
 use std::fmt::Arguments;
 use std::ops::Range;
+use std::sync::OnceLock;
 
 use rayon::prelude::*;
 
 use super::atlas::{Atlas, Simulate, White};
 use super::diagnosis::is_noise;
 use super::expectation::Expectation;
-use super::hunt::Hunt;
 use super::hypothesis::{Freedom, Hypothesis, Part, Shape};
 use super::observed::ObservedLap;
 use super::refine::{CLOSE_SETS, Descent, Round, Settled};
 use super::ripple::Ripple;
+use super::scans::Scan;
 use super::screen::Screened;
 use super::simulated::FINAL_SETS;
 use super::tests_of_fit::{FourNumbers, HOPELESS_P, Quadratic, SIGNIFICANT_P};
@@ -44,6 +45,8 @@ pub(super) struct Search<'a> {
     /// The laps of each run.
     pub(super) runs: &'a [Vec<ObservedLap>],
     pub(super) watch: &'a Watch<'a>,
+    /// What effects that jump leave at sizes all over their range, once that was asked for.
+    pub(super) scanned: OnceLock<Vec<Scan>>,
 }
 
 /// Rounds of a descent, each with the log-likelihood, and the share of the best one's, by which what lies behind then does
@@ -60,7 +63,7 @@ const ROUNDS: [(Round, f64, f64); 5] = [
 ];
 
 /// The same for several effects together, of which more are tried.
-const ROUNDS_OF_SEVERAL: [(Round, f64, f64); 6] = [
+pub(super) const ROUNDS_OF_SEVERAL: [(Round, f64, f64); 6] = [
     (Round::Rough, 50.0, 0.06),
     (Round::Again, 30.0, 0.02),
     (Round::Again, 25.0, 0.006),
@@ -83,7 +86,7 @@ const ROUNDS_BESIDE: [(Round, f64, f64); 6] = [
 const ROUNDS_OF_GROUPS: [(Round, f64, f64); 2] = [(Round::Rough, 30.0, 0.05), (Round::Full, 20.0, 0.015)];
 
 /// Explanations beside which a further effect is sought: the best need not be part of the best with one more.
-const BASES: usize = 2;
+pub(super) const BASES: usize = 2;
 
 /// Log-likelihood up to which a signal is weak.
 pub(super) const WEAK: f64 = 400.0;
@@ -156,11 +159,6 @@ impl Search<'_> {
             .collect()
     }
 
-    /// Effects whose action jumps with their size, at the best of many sizes: derivatives say nothing of them.
-    pub(super) fn scans(&self) -> Vec<Found> {
-        self.jumping().filter_map(|probe| self.scan(probe)).collect()
-    }
-
     /// Whether a hypothesis has an effect whose action jumps with its size.
     pub(super) fn jumps(&self, hypothesis: &Hypothesis) -> bool {
         let mut parts = hypothesis.parts.iter();
@@ -171,56 +169,6 @@ impl Search<'_> {
     pub(super) fn jumped(&self, found: &Found) -> bool {
         let held = found.hypothesis.parts.iter().all(|part| part.held.is_some());
         self.jumps(&found.hypothesis) && !held
-    }
-
-    fn scan(&self, probe: usize) -> Option<Found> {
-        let nothing = self.atlas.at_rest(Hypothesis { parts: Vec::new() });
-        self.tell(format_args!(
-            "every size of {}",
-            self.atlas.probes[probe].spec.name
-        ));
-        let (_, hunt) = (self.atlas).hunt(self.simulate, self.data, &nothing, probe)?;
-        let found = self.atlas.hunted(self.simulate, self.data, &hunt)?;
-        let end = Descent::start(self.atlas, &found);
-        let settled = self.atlas.settle(self.simulate, self.data, &end)?;
-        Some(self.found(&settled))
-    }
-
-    /// Effects whose action jumps with their size beside the best single effects and beside either of the best pair's; those that
-    /// come nowhere near the best are not tried to the end.
-    pub(super) fn scans_beside(&self, found: &[Found]) -> Vec<Found> {
-        const CLOSER: usize = 2;
-        let mut bases: Vec<Hypothesis> = Vec::new();
-        for part in found.iter().flat_map(|found| &found.hypothesis.parts) {
-            let spec = |part: &Part| self.atlas.probes[part.probe].spec;
-            let constant = part.shape == Shape::Constant;
-            if constant && bases.len() < BASES && bases.iter().all(|base| spec(&base.parts[0]) != spec(part))
-            {
-                bases.push(Hypothesis::of(part.clone()));
-            }
-        }
-        let mut hunts: Vec<(f64, Hunt)> = Vec::new();
-        for base in bases {
-            let spec = self.atlas.probes[base.parts[0].probe].spec;
-            let base = self.base(base);
-            for probe in self
-                .jumping()
-                .filter(|&probe| self.atlas.probes[probe].spec != spec)
-            {
-                let name = self.atlas.probes[probe].spec.name;
-                self.tell(format_args!("every size of {name} beside {}", spec.name));
-                hunts.extend(self.atlas.hunt(self.simulate, self.data, &base, probe));
-            }
-        }
-        hunts.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let starts: Vec<Hypothesis> = (hunts.iter().take(CLOSER))
-            .filter_map(|(_, hunt)| self.atlas.hunted(self.simulate, self.data, hunt))
-            .collect();
-        self.settle(self.descend_several(&starts, &ROUNDS_OF_SEVERAL, near(found)))
-    }
-
-    fn jumping(&self) -> impl Iterator<Item = usize> {
-        (0..self.atlas.probes.len()).filter(|&probe| self.atlas.probes[probe].jumps)
     }
 
     /// The best explanations with a size that goes over the runs or in time, where what they leave does, all in all or along
@@ -288,6 +236,10 @@ impl Search<'_> {
             let best = best_of(&descents).map_or(reached, |best| best.score);
             descents.extend(self.descend_several(&further, rounds, best));
             starts.extend(further);
+            let jumping = self.pairs_that_jump();
+            let best = best_of(&descents).map_or(reached, |best| best.score);
+            descents.extend(self.descend_several(&jumping, rounds, best));
+            starts.extend(jumping);
         }
         self.with_exchanged(descents, &starts, rounds, reached)
     }
@@ -358,7 +310,7 @@ impl Search<'_> {
 
     /// Descends from hypotheses of several effects; the best one is tried without its patterns too, one of them or all, and with
     /// its pattern given to another of its effects: what another effect left may have suggested it.
-    fn descend_several(&self, starts: &[Hypothesis], rounds: &Rounds, reached: f64) -> Vec<Descent> {
+    pub(super) fn descend_several(&self, starts: &[Hypothesis], rounds: &Rounds, reached: f64) -> Vec<Descent> {
         let mut descents = self.descend(starts.iter(), rounds, reached);
         if let Some(best) = best_of(&descents) {
             let plain = best.hypothesis.without_patterns(self.atlas).into_iter();
@@ -559,7 +511,7 @@ impl Search<'_> {
         }
     }
 
-    fn tell(&self, what: Arguments<'_>) {
+    pub(super) fn tell(&self, what: Arguments<'_>) {
         (self.watch)(&what.to_string());
     }
 
@@ -576,7 +528,7 @@ impl Search<'_> {
     }
 
     /// The ends of descents simulated often enough to judge them, best first.
-    fn settle(&self, descents: Vec<Descent>) -> Vec<Found> {
+    pub(super) fn settle(&self, descents: Vec<Descent>) -> Vec<Found> {
         let settled = (self.hunted_again(descents).par_iter())
             .filter_map(|descent| self.atlas.settle(self.simulate, self.data, descent))
             .collect();
@@ -672,7 +624,7 @@ impl Search<'_> {
         others
     }
 
-    fn found(&self, settled: &Settled) -> Found {
+    pub(super) fn found(&self, settled: &Settled) -> Found {
         let Settled { refined, evaluated } = settled;
         let atlas = self.atlas;
         let excess = |squares: f64| squares - self.residual.len() as f64;
@@ -723,7 +675,7 @@ pub(super) fn candidates(
 const SLOW: f64 = 0.1;
 
 /// A score that is near the best found: what is only begun may still come to that.
-fn near(found: &[Found]) -> f64 {
+pub(super) fn near(found: &[Found]) -> f64 {
     const NEAR: f64 = 0.8;
     (found.first()).map_or(f64::NEG_INFINITY, |best| NEAR * best.explanation.score)
 }

@@ -1,0 +1,227 @@
+//! Effects whose action jumps with their size, at sizes all over their range: derivatives say nothing of them.
+
+use std::collections::BTreeMap;
+
+use nalgebra::DMatrix;
+use rayon::prelude::*;
+
+use super::atlas::{Atlas, Simulate, White};
+use super::beside::Base;
+use super::expectation::Expectation;
+use super::hunt::{Hunt, Look};
+use super::hypothesis::{Hypothesis, Part, Shape};
+use super::pairs::Piece;
+use super::refine::Descent;
+use super::search::{BASES, Found, ROUNDS_OF_SEVERAL, Search, near};
+
+/// What a probe that jumps leaves of the data beside a base at sizes all over its range.
+#[derive(Debug, Clone)]
+pub(super) struct Scan {
+    probe: usize,
+    /// Of one size to the one before.
+    ratio: f64,
+    /// What the base leaves without it, in squared distance beyond chance.
+    excess: f64,
+    looks: Vec<Look>,
+}
+
+/// A probe beside one that jumps, at the sizes that together leave least of the data.
+struct Beside {
+    score: f64,
+    other: Hypothesis,
+    jumping: usize,
+    size: f64,
+    spacing: f64,
+}
+
+impl Scan {
+    /// The best size, and the squared distance that it leaves; `None` where no size explains a fair share of what the base
+    /// leaves.
+    fn best(&self, base: &Base, chance: f64) -> Option<(f64, Hunt)> {
+        const FAIR_SHARE: f64 = 0.25;
+        let squares = self.looks.iter().map(|look| (look.square(), look.size));
+        let (left, size) = squares.min_by(|a, b| a.0.total_cmp(&b.0))?;
+        let fair = left - chance < (1.0 - FAIR_SHARE) * self.excess;
+        fair.then(|| (left, Hunt::new(base.clone(), self.probe, size, self.spacing(size))))
+    }
+
+    /// How far off a size may be.
+    fn spacing(&self, size: f64) -> f64 {
+        size * (self.ratio - 1.0)
+    }
+}
+
+impl Atlas {
+    fn scan(
+        &self,
+        simulate: &Simulate<'_>,
+        data: &Expectation,
+        base: &Base,
+        probe: usize,
+    ) -> Option<Scan> {
+        const COARSE: usize = 60;
+        const SETS: u64 = 3;
+        /// Two pairs of data sets at each size where less is left to explain than so many times what chance leaves, else one.
+        const LITTLE: f64 = 3.0;
+        let sizes = &self.probes[probe].sizes;
+        let (low, high) = (sizes[0], sizes[sizes.len() - 1]);
+        // Sizes in a constant ratio: what matters is how many steps fit into a speed or a reading.
+        let ratio = (high / low).powf(1.0 / (COARSE - 1) as f64);
+        let sizes: Vec<f64> = (0..COARSE).map(|i| low * ratio.powi(i as i32)).collect();
+        let without = if base.hypothesis.parts.is_empty() {
+            self.null.clone()
+        } else {
+            self.evaluate(simulate, &base.hypothesis, SETS)?.expectation
+        };
+        let chance = self.layout.len() as f64;
+        let excess = self.left_beyond(data, base, &without).norm_squared() - chance;
+        let sets = if excess < LITTLE * chance {
+            [0..2, 2..4]
+        } else {
+            [0..1, 0..1]
+        };
+        Some(Scan {
+            probe,
+            ratio,
+            excess,
+            looks: self.looks(simulate, data, base, probe, &sizes, &sets),
+        })
+    }
+}
+
+impl Atlas {
+    /// Every constant probe that does not jump beside every scanned one, at the sizes at which they explain a residual best, best
+    /// first.
+    fn screen_beside_scans(&self, residual: &White, scans: &[Scan]) -> Vec<Beside> {
+        let pieces: Vec<Piece> = self.smooth_pieces();
+        let columns = |of: fn(&Piece) -> &White| {
+            DMatrix::from_columns(&pieces.iter().map(|piece| of(piece).clone()).collect::<Vec<_>>())
+        };
+        let (along, from) = (columns(|piece| &piece.along), columns(|piece| &piece.from));
+        let mut all: Vec<Beside> = Vec::new();
+        for scan in scans.iter().filter(|scan| !scan.looks.is_empty()) {
+            let left: Vec<White> = scan.looks.iter().map(Look::mean).collect();
+            let left = DMatrix::from_columns(&left);
+            let (along_left, from_left) = (along.tr_mul(&left), from.tr_mul(&left));
+            let mut best: BTreeMap<usize, (f64, f64, f64)> = BTreeMap::new();
+            for (k, look) in scan.looks.iter().enumerate() {
+                let gained = residual.norm_squared() - look.square();
+                for (i, piece) in pieces.iter().enumerate() {
+                    let (gain, size) = piece.best(along_left[(i, k)], from_left[(i, k)]);
+                    let entry = best.entry(piece.probe).or_insert((f64::NEG_INFINITY, 0.0, 0.0));
+                    if gained + gain > entry.0 {
+                        *entry = (gained + gain, look.size, size);
+                    }
+                }
+            }
+            all.extend(best.into_iter().map(|(probe, (gain, size, beside))| Beside {
+                score: self.score_of_pair([scan.probe, probe], 0.5 * gain),
+                other: Hypothesis::of(Part::screened(self, probe, Shape::Constant, &[beside])),
+                jumping: scan.probe,
+                size,
+                spacing: scan.spacing(size),
+            }));
+        }
+        all.sort_by(|a, b| b.score.total_cmp(&a.score));
+        all
+    }
+}
+
+impl Search<'_> {
+    /// Effects whose action jumps with their size, at the best of many sizes.
+    pub(super) fn scans(&self) -> Vec<Found> {
+        let nothing = self.atlas.at_rest(Hypothesis { parts: Vec::new() });
+        let closer = |scan: &Scan| {
+            self.tell(format_args!(
+                "closer sizes of {}",
+                self.atlas.probes[scan.probe].spec.name
+            ));
+            let (_, hunt) = scan.best(&nothing, self.chance())?;
+            let found = self.atlas.hunted(self.simulate, self.data, &hunt)?;
+            let end = Descent::start(self.atlas, &found);
+            let settled = self.atlas.settle(self.simulate, self.data, &end)?;
+            Some(self.found(&settled))
+        };
+        self.scanned().iter().filter_map(closer).collect()
+    }
+
+    /// What every effect that jumps leaves at sizes all over its range; simulated once.
+    fn scanned(&self) -> &[Scan] {
+        self.scanned.get_or_init(|| {
+            let nothing = self.atlas.at_rest(Hypothesis { parts: Vec::new() });
+            let scan = |probe: usize| {
+                let name = self.atlas.probes[probe].spec.name;
+                self.tell(format_args!("every size of {name}"));
+                self.atlas.scan(self.simulate, self.data, &nothing, probe)
+            };
+            self.jumping().filter_map(scan).collect()
+        })
+    }
+
+    /// Pairs of an effect that jumps and one that does not, those that promise most at the best of sizes ever closer. What both
+    /// do is taken to add up where they are looked for: no single effect need come near.
+    pub(super) fn pairs_that_jump(&self) -> Vec<Hypothesis> {
+        const HEARD: usize = 8;
+        const KEPT: usize = 3;
+        /// Squared distance, and the share of what the best leaves, by which a pair may lie behind it.
+        const BEHIND: (f64, f64) = (100.0, 0.5);
+        self.tell(format_args!("which sizes that jump go with another effect"));
+        let mut beside = self.atlas.screen_beside_scans(self.residual, self.scanned());
+        beside.truncate(HEARD);
+        let look = |beside: &Beside| {
+            let base = self.atlas.following(self.simulate, beside.other.clone());
+            let hunt = Hunt::new(base, beside.jumping, beside.size, beside.spacing);
+            self.atlas.hunted_once(self.simulate, self.data, hunt)
+        };
+        let mut hunts: Vec<(f64, Hunt)> = beside.par_iter().filter_map(look).collect();
+        hunts.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let least = hunts.first().map_or(0.0, |hunt| hunt.0);
+        let bound = least + BEHIND.0.max(BEHIND.1 * (least - self.chance()));
+        (hunts.iter().take(KEPT).filter(|hunt| hunt.0 <= bound))
+            .filter_map(|(_, hunt)| self.atlas.hunted(self.simulate, self.data, hunt))
+            .collect()
+    }
+
+    /// Effects whose action jumps with their size beside the best single effects and beside either of the best pair's; those that
+    /// come nowhere near the best are not tried to the end.
+    pub(super) fn scans_beside(&self, found: &[Found]) -> Vec<Found> {
+        const CLOSER: usize = 2;
+        let mut bases: Vec<Hypothesis> = Vec::new();
+        for part in found.iter().flat_map(|found| &found.hypothesis.parts) {
+            let spec = |part: &Part| self.atlas.probes[part.probe].spec;
+            let constant = part.shape == Shape::Constant;
+            if constant && bases.len() < BASES && bases.iter().all(|base| spec(&base.parts[0]) != spec(part))
+            {
+                bases.push(Hypothesis::of(part.clone()));
+            }
+        }
+        let mut hunts: Vec<(f64, Hunt)> = Vec::new();
+        for base in bases {
+            let spec = self.atlas.probes[base.parts[0].probe].spec;
+            let base = self.base(base);
+            for probe in self
+                .jumping()
+                .filter(|&probe| self.atlas.probes[probe].spec != spec)
+            {
+                let name = self.atlas.probes[probe].spec.name;
+                self.tell(format_args!("every size of {name} beside {}", spec.name));
+                let scan = self.atlas.scan(self.simulate, self.data, &base, probe);
+                hunts.extend(scan.and_then(|scan| scan.best(&base, self.chance())));
+            }
+        }
+        hunts.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let starts: Vec<Hypothesis> = (hunts.iter().take(CLOSER))
+            .filter_map(|(_, hunt)| self.atlas.hunted(self.simulate, self.data, hunt))
+            .collect();
+        self.settle(self.descend_several(&starts, &ROUNDS_OF_SEVERAL, near(found)))
+    }
+
+    /// The squared distance that chance leaves.
+    fn chance(&self) -> f64 {
+        self.atlas.layout.len() as f64
+    }
+
+    fn jumping(&self) -> impl Iterator<Item = usize> {
+        (0..self.atlas.probes.len()).filter(|&probe| self.atlas.probes[probe].jumps)
+    }
+}
