@@ -11,7 +11,7 @@ use super::memo::Memo;
 use super::observed::ObservedLap;
 use super::ripple::Ripple;
 use super::screen::Screened;
-use super::search::{Found, Search, candidates, sort};
+use super::search::{Found, STRONG, Search, candidates, sort};
 use super::tests_of_fit::{FourNumbers, SIGNIFICANT_P};
 use crate::answer::{ALTERNATIVE, indistinguishable};
 use crate::{Answer, Cause, Error, Explanation, Verdict, Watch};
@@ -28,9 +28,6 @@ const ENOUGH: f64 = 0.98;
 const ALL_BUT: f64 = 0.995;
 /// Share that several effects, or one without a name, must explain to be claimed in part.
 const MOST: f64 = 0.9;
-/// Score above which a signal is strong: the right names leave next to nothing of another, and what is left by up to three tells of
-/// a cause that has none.
-const STRONG: f64 = 2000.0;
 /// Share up to which an explanation does not stand that leaves what is not likely, be it not significant: of weak signals chance
 /// alone explains as much.
 const TOO_LITTLE: f64 = 0.7;
@@ -120,6 +117,7 @@ impl Atlas {
             runs,
             watch,
             scanned: OnceLock::new(),
+            together: OnceLock::new(),
         };
         let ripple = search.ripple(&Hypothesis { parts: Vec::new() });
         let alarm = numbers.omnibus_p() < ALARM_P || self.best_score(&residual) > ALARM_SCORE;
@@ -214,6 +212,13 @@ fn explain(search: &Search<'_>, mut found: Vec<Found>) -> Vec<Found> {
     if !first_is(&found, |best| {
         leaves_nothing_to_ask(best) || best.share > MOST && !jumps && !goes_over_runs_or_time(best)
     }) {
+        let clear = search.clear_pairs();
+        if first_is(&clear, leaves_nothing_to_ask) {
+            found = preferred(found, clear);
+            if first_is(&found, |best| best.effects.len() > 1) {
+                return held_still(search, found);
+            }
+        }
         let scans = search.scans();
         if !scans.is_empty() {
             found.retain(|found| !search.jumped(found));
@@ -257,10 +262,15 @@ fn explain(search: &Search<'_>, mut found: Vec<Found>) -> Vec<Found> {
         let unnamed = search.unnamed(&found);
         found = unless_named(found, unnamed);
     }
+    held_still(search, found)
+}
+
+/// Explanations of which the first, if a name is claimed, holds still within the runs: else what was seen to settle comes first.
+fn held_still(search: &Search<'_>, found: Vec<Found>) -> Vec<Found> {
     let claimed = |best: &Explanation| verdict_of(best) != Verdict::Unexplained && !best.has_no_name();
     if let Some(best) = found.first().filter(|best| claimed(&best.explanation)) {
         let settling = search.settling(best);
-        found = unless_steady(found, settling);
+        return unless_steady(found, settling);
     }
     found
 }

@@ -1,7 +1,5 @@
 //! Effects whose action jumps with their size, at sizes all over their range: derivatives say nothing of them.
 
-use std::collections::BTreeMap;
-
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
@@ -28,10 +26,20 @@ pub(super) struct Scan {
 /// A probe beside one that jumps, at the sizes that together leave least of the data.
 struct Beside {
     score: f64,
-    other: Hypothesis,
+    other: usize,
+    other_size: f64,
     jumping: usize,
     size: f64,
     spacing: f64,
+}
+
+impl Beside {
+    /// Whether another has the same effect that jumps at about the same size.
+    fn is_about(&self, other: &Self) -> bool {
+        const SPACINGS: f64 = 1.5;
+        self.jumping == other.jumping
+            && (self.size - other.size).abs() < SPACINGS * self.spacing.max(other.spacing)
+    }
 }
 
 impl Scan {
@@ -59,15 +67,9 @@ impl Atlas {
         base: &Base,
         probe: usize,
     ) -> Option<Scan> {
-        const COARSE: usize = 60;
         const SETS: u64 = 3;
-        /// Two pairs of data sets at each size where less is left to explain than so many times what chance leaves, else one.
+        /// Excess, in units of what chance leaves, below which noise would hide which size is best.
         const LITTLE: f64 = 3.0;
-        let sizes = &self.probes[probe].sizes;
-        let (low, high) = (sizes[0], sizes[sizes.len() - 1]);
-        // Sizes in a constant ratio: what matters is how many steps fit into a speed or a reading.
-        let ratio = (high / low).powf(1.0 / (COARSE - 1) as f64);
-        let sizes: Vec<f64> = (0..COARSE).map(|i| low * ratio.powi(i as i32)).collect();
         let without = if base.hypothesis.parts.is_empty() {
             self.null.clone()
         } else {
@@ -75,11 +77,17 @@ impl Atlas {
         };
         let chance = self.layout.len() as f64;
         let excess = self.left_beyond(data, base, &without).norm_squared() - chance;
-        let sets = if excess < LITTLE * chance {
-            [0..2, 2..4]
+        // Many sizes with one data set each, or fewer with two pairs of them.
+        let (count, sets) = if excess < LITTLE * chance {
+            (60, [0..2, 2..4])
         } else {
-            [0..1, 0..1]
+            (120, [0..1, 0..1])
         };
+        let sizes = &self.probes[probe].sizes;
+        let (low, high) = (sizes[0], sizes[sizes.len() - 1]);
+        // Sizes in a constant ratio: what matters is how many steps fit into a speed or a reading.
+        let ratio = (high / low).powf(1.0 / f64::from(count - 1));
+        let sizes: Vec<f64> = (0..count).map(|i| low * ratio.powi(i)).collect();
         Some(Scan {
             probe,
             ratio,
@@ -90,9 +98,9 @@ impl Atlas {
 }
 
 impl Atlas {
-    /// Every constant probe that does not jump beside every scanned one, at the sizes at which they explain a residual best, best
-    /// first.
-    fn screen_beside_scans(&self, residual: &White, scans: &[Scan]) -> Vec<Beside> {
+    /// The constant probes that do not jump which explain a residual best beside every scanned one, best first: of a probe that
+    /// jumps few at a size and about it.
+    fn screen_beside_scans(&self, residual: &White, scans: &[Scan], most: usize) -> Vec<Beside> {
         let pieces: Vec<Piece> = self.smooth_pieces();
         let columns = |of: fn(&Piece) -> &White| {
             DMatrix::from_columns(&pieces.iter().map(|piece| of(piece).clone()).collect::<Vec<_>>())
@@ -103,27 +111,46 @@ impl Atlas {
             let left: Vec<White> = scan.looks.iter().map(Look::mean).collect();
             let left = DMatrix::from_columns(&left);
             let (along_left, from_left) = (along.tr_mul(&left), from.tr_mul(&left));
-            let mut best: BTreeMap<usize, (f64, f64, f64)> = BTreeMap::new();
             for (k, look) in scan.looks.iter().enumerate() {
                 let gained = residual.norm_squared() - look.square();
-                for (i, piece) in pieces.iter().enumerate() {
+                let beside = |(i, piece): (usize, &Piece)| {
                     let (gain, size) = piece.best(along_left[(i, k)], from_left[(i, k)]);
-                    let entry = best.entry(piece.probe).or_insert((f64::NEG_INFINITY, 0.0, 0.0));
-                    if gained + gain > entry.0 {
-                        *entry = (gained + gain, look.size, size);
+                    Beside {
+                        score: self.score_of_pair([scan.probe, piece.probe], 0.5 * (gained + gain)),
+                        other: piece.probe,
+                        other_size: size,
+                        jumping: scan.probe,
+                        size: look.size,
+                        spacing: scan.spacing(look.size),
                     }
-                }
+                };
+                let mut at_size: Vec<Beside> = pieces.iter().enumerate().map(beside).collect();
+                at_size.sort_by(|a, b| b.score.total_cmp(&a.score));
+                at_size.truncate(most);
+                all.extend(at_size);
             }
-            all.extend(best.into_iter().map(|(probe, (gain, size, beside))| Beside {
-                score: self.score_of_pair([scan.probe, probe], 0.5 * gain),
-                other: Hypothesis::of(Part::screened(self, probe, Shape::Constant, &[beside])),
-                jumping: scan.probe,
-                size,
-                spacing: scan.spacing(size),
-            }));
         }
         all.sort_by(|a, b| b.score.total_cmp(&a.score));
-        all
+        self.diverse_beside(all, most)
+    }
+
+    /// The best of probes beside those that jump: few at a size and about it, each effect once.
+    fn diverse_beside(&self, sorted: Vec<Beside>, most: usize) -> Vec<Beside> {
+        const AT_A_SIZE: usize = 2;
+        let spec = |beside: &Beside| self.probes[beside.other].spec;
+        let mut kept: Vec<Beside> = Vec::new();
+        for beside in sorted {
+            let near = kept.iter().filter(|other| beside.is_about(other));
+            let (mut count, mut known) = (0, false);
+            for other in near {
+                count += 1;
+                known |= spec(other) == spec(&beside);
+            }
+            if kept.len() < most && count < AT_A_SIZE && !known {
+                kept.push(beside);
+            }
+        }
+        kept
     }
 }
 
@@ -166,10 +193,15 @@ impl Search<'_> {
         /// Squared distance, and the share of what the best leaves, by which a pair may lie behind it.
         const BEHIND: (f64, f64) = (100.0, 0.5);
         self.tell(format_args!("which sizes that jump go with another effect"));
-        let mut beside = self.atlas.screen_beside_scans(self.residual, self.scanned());
-        beside.truncate(HEARD);
+        let beside = (self.atlas).screen_beside_scans(self.residual, self.scanned(), HEARD);
         let look = |beside: &Beside| {
-            let base = self.atlas.following(self.simulate, beside.other.clone());
+            let other = Part::screened(
+                self.atlas,
+                beside.other,
+                Shape::Constant,
+                &[beside.other_size],
+            );
+            let base = self.atlas.following(self.simulate, Hypothesis::of(other));
             let hunt = Hunt::new(base, beside.jumping, beside.size, beside.spacing);
             self.atlas.hunted_once(self.simulate, self.data, hunt)
         };

@@ -13,6 +13,7 @@ use super::diagnosis::is_noise;
 use super::expectation::Expectation;
 use super::hypothesis::{Freedom, Hypothesis, Part, Shape};
 use super::observed::ObservedLap;
+use super::pairs::ScreenedPair;
 use super::refine::{CLOSE_SETS, Descent, Round, Settled};
 use super::ripple::Ripple;
 use super::scans::Scan;
@@ -47,6 +48,8 @@ pub(super) struct Search<'a> {
     pub(super) watch: &'a Watch<'a>,
     /// What effects that jump leave at sizes all over their range, once that was asked for.
     pub(super) scanned: OnceLock<Vec<Scan>>,
+    /// Pairs that are looked for together, once they were asked for.
+    pub(super) together: OnceLock<Vec<ScreenedPair>>,
 }
 
 /// Rounds of a descent, each with the log-likelihood, and the share of the best one's, by which what lies behind then does
@@ -90,6 +93,10 @@ pub(super) const BASES: usize = 2;
 
 /// Log-likelihood up to which a signal is weak.
 pub(super) const WEAK: f64 = 400.0;
+
+/// Log-likelihood above which it is strong: the right names leave next to nothing of another, and what is left by up to three
+/// tells of a cause that has none.
+pub(super) const STRONG: f64 = 2000.0;
 
 /// Errors of a difference in log-likelihood that may be chance.
 const ERRORS: f64 = 2.0;
@@ -213,16 +220,27 @@ impl Search<'_> {
         ]
     }
 
-    /// The best pairs, tried to the end: those that together explain most as far as actions add up, and the best single
-    /// effects with what explains their remainder best.
+    /// Pairs that are looked for together, and explain nearly all of a strong signal where they are simulated, tried to the end.
+    pub(super) fn clear_pairs(&self) -> Vec<Found> {
+        const NEARLY_ALL: f64 = 0.95;
+        let all = 0.5 * (self.residual.norm_squared() - self.residual.len() as f64);
+        if all < STRONG {
+            return Vec::new();
+        }
+        let best = self.together().first();
+        if best.is_none_or(|best| best.score < NEARLY_ALL * all) {
+            return Vec::new();
+        }
+        let starts = self.best_together();
+        let reached = f64::NEG_INFINITY;
+        let descents = self.descend_several(&starts, &ROUNDS_OF_SEVERAL, reached);
+        self.with_exchanged(descents, &starts, &ROUNDS_OF_SEVERAL, reached)
+    }
+
+    /// The best pairs, tried to the end: those that together explain most as far as actions add up, the best single effects
+    /// with what explains their remainder best, and sizes that jump with another effect.
     pub(super) fn pairs(&self, singles: &[Found]) -> Vec<Found> {
-        /// Pairs that are simulated where they were screened.
-        const HEARD: usize = 48;
-        const PAIRS: usize = 5;
-        self.tell(format_args!("which two effects go together"));
-        let heard = self.heard_pairs(self.atlas.screen_pairs(self.residual, HEARD));
-        let best = heard.into_iter().take(PAIRS);
-        let mut starts: Vec<Hypothesis> = best.map(|pair| pair.hypothesis).collect();
+        let mut starts = self.best_together();
         let (rounds, reached) = (&ROUNDS_OF_SEVERAL, f64::NEG_INFINITY);
         let mut descents = self.descend_several(&starts, rounds, reached);
         if !best_of(&descents).is_some_and(Descent::fits) {
@@ -232,16 +250,30 @@ impl Search<'_> {
                 let beside = self.beside(&base, &single.left, &further);
                 further.extend(beside);
             }
-            let further = further.split_off(starts.len());
-            let best = best_of(&descents).map_or(reached, |best| best.score);
-            descents.extend(self.descend_several(&further, rounds, best));
-            starts.extend(further);
-            let jumping = self.pairs_that_jump();
-            let best = best_of(&descents).map_or(reached, |best| best.score);
-            descents.extend(self.descend_several(&jumping, rounds, best));
-            starts.extend(jumping);
+            for further in [further.split_off(starts.len()), self.pairs_that_jump()] {
+                let best = best_of(&descents).map_or(reached, |best| best.score);
+                descents.extend(self.descend_several(&further, rounds, best));
+                starts.extend(further);
+            }
         }
         self.with_exchanged(descents, &starts, rounds, reached)
+    }
+
+    /// The best of the pairs that are looked for together.
+    fn best_together(&self) -> Vec<Hypothesis> {
+        const PAIRS: usize = 5;
+        let best = self.together().iter().take(PAIRS);
+        best.map(|pair| pair.hypothesis.clone()).collect()
+    }
+
+    /// Pairs that together explain most as far as actions add up, as simulations where they were screened rank them; simulated
+    /// once.
+    fn together(&self) -> &[ScreenedPair] {
+        const HEARD: usize = 48;
+        self.together.get_or_init(|| {
+            self.tell(format_args!("which two effects go together"));
+            self.heard_pairs(self.atlas.screen_pairs(self.residual, HEARD))
+        })
     }
 
     /// The best pairs of a single effect that explains nearly all, tried to the end: those with what explains best what it
