@@ -25,6 +25,14 @@ pub(super) struct Hunt {
     looks: usize,
 }
 
+/// How far the effects beside one that jumps have moved since its size was found: it may be off by some per cent, or by a tenth of
+/// that.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Moved {
+    Far,
+    Little,
+}
+
 impl Hunt {
     pub(super) fn new(base: Base, probe: usize, size: f64, spacing: f64) -> Self {
         Self {
@@ -64,7 +72,18 @@ impl Atlas {
         data: &Expectation,
         hunt: &Hunt,
     ) -> Option<Hypothesis> {
-        let part = self.hunt_closer(simulate, data, hunt.clone(), &CLOSER[hunt.looks..])?;
+        self.hunted_for(simulate, data, hunt, CLOSER.len())
+    }
+
+    /// The same after so many looks from where the hunt began.
+    pub(super) fn hunted_for(
+        &self,
+        simulate: &Simulate<'_>,
+        data: &Expectation,
+        hunt: &Hunt,
+        looks: usize,
+    ) -> Option<Hypothesis> {
+        let part = self.hunt_closer(simulate, data, hunt.clone(), &CLOSER[hunt.looks..looks])?;
         Some(hunt.base.hypothesis.with(&Hypothesis::of(part)))
     }
 
@@ -86,11 +105,14 @@ impl Atlas {
         simulate: &Simulate<'_>,
         data: &Expectation,
         hypothesis: &Hypothesis,
+        moved: Moved,
     ) -> Option<Hypothesis> {
-        /// Share of a size by which it may be off at most.
-        const OFF: f64 = 0.04;
-        self.hunt_each(simulate, data, hypothesis, &CLOSER, |hunt| {
-            hunt.spacing = OFF * hunt.size;
+        let (off, levels) = match moved {
+            Moved::Far => (0.04, &CLOSER[..]),
+            Moved::Little => (0.004, &CLOSER[2..]),
+        };
+        self.hunt_each(simulate, data, hypothesis, levels, |hunt| {
+            hunt.spacing = off * hunt.size;
             hunt.base = self.base(simulate, data, hunt.base.hypothesis.clone());
         })
     }

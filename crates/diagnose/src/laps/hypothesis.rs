@@ -415,7 +415,8 @@ impl Hypothesis {
     /// The same with the sizes of these parts where it has their effects at a size that was found by trying many.
     pub(super) fn with_held(&self, known: &[Part]) -> Self {
         let held = |part: &Part| {
-            let same = |known: &&Part| part.held.is_some() && known.probe == part.probe && known.is_about(part);
+            let same =
+                |known: &&Part| part.held.is_some() && known.probe == part.probe && known.is_about(part);
             known.iter().find(same).unwrap_or(part).clone()
         };
         Self {

@@ -41,6 +41,8 @@ impl Piece {
 pub(super) struct ScreenedPair {
     pub(super) hypothesis: Hypothesis,
     pub(super) score: f64,
+    /// What they leave of the residual, in squared distance.
+    pub(super) left: f64,
     /// Along the paths of its probes.
     sizes: [f64; 2],
 }
@@ -88,6 +90,7 @@ impl Atlas {
                 ScreenedPair {
                     hypothesis,
                     score: self.score_of_pair([a, b], 0.5 * gain),
+                    left: residual.norm_squared() - gain,
                     sizes,
                 }
             })
@@ -178,6 +181,7 @@ impl Search<'_> {
                 parts: vec![part(0), part(1)],
             },
             score: atlas.score_of_pair(probes, gain),
+            left: self.residual.norm_squared() - 2.0 * gain,
             sizes,
         })
     }

@@ -24,6 +24,8 @@ pub(super) struct Probe {
     pub(super) quantum: Option<f64>,
     /// Whether its action jumps with its size.
     pub(super) jumps: bool,
+    /// Sizes in a constant ratio of which one is near enough to any other for what jumps to be about the same.
+    pub(super) scanned: u32,
     /// Whether its size is a limit, which does the more the smaller it is and nothing where it is large.
     limit: bool,
     /// Data sets simulated beforehand for each size.
@@ -52,6 +54,7 @@ impl Probe {
             odd: false,
             quantum: None,
             jumps: false,
+            scanned: 0,
             limit: false,
             sets: PROBE_SETS,
         }
@@ -144,8 +147,9 @@ impl Probe {
     }
 }
 
-/// Effects whose action jumps with their size.
-const JUMPS: [&str; 3] = ["speed-step", "dead-band", "reading-step"];
+/// Effects whose action jumps with their size, and the number of sizes to scan: a speed of a dozen steps is rounded otherwise where
+/// a step is half a per cent larger; readings are many, and bands of interest few.
+const JUMPS: [(&str, u32); 3] = [("speed-step", 240), ("dead-band", 60), ("reading-step", 60)];
 
 /// Sizes of the first parameter of an effect.
 fn line(name: &str, sizes: &[f64]) -> Vec<Probe> {
@@ -184,6 +188,7 @@ fn probe(name: &str, fixed: &[(&str, f64)], sizes: &[f64], free: &[(&str, f64)])
         .into_iter()
         .chain(free.iter().map(|(key, step)| (index(key), *step)))
         .collect();
+    let jumping = JUMPS.iter().find(|jumping| jumping.0 == name);
     vec![Probe {
         spec,
         origin,
@@ -193,7 +198,8 @@ fn probe(name: &str, fixed: &[(&str, f64)], sizes: &[f64], free: &[(&str, f64)])
         free,
         odd: false,
         quantum: None,
-        jumps: JUMPS.contains(&name),
+        jumps: jumping.is_some(),
+        scanned: jumping.map_or(0, |jumping| jumping.1),
         limit,
         sets: PROBE_SETS,
     }]

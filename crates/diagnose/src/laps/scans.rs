@@ -50,7 +50,12 @@ impl Scan {
         let squares = self.looks.iter().map(|look| (look.square(), look.size));
         let (left, size) = squares.min_by(|a, b| a.0.total_cmp(&b.0))?;
         let fair = left - chance < (1.0 - FAIR_SHARE) * self.excess;
-        fair.then(|| (left, Hunt::new(base.clone(), self.probe, size, self.spacing(size))))
+        fair.then(|| {
+            (
+                left,
+                Hunt::new(base.clone(), self.probe, size, self.spacing(size)),
+            )
+        })
     }
 
     /// How far off a size may be.
@@ -60,14 +65,9 @@ impl Scan {
 }
 
 impl Atlas {
-    fn scan(
-        &self,
-        simulate: &Simulate<'_>,
-        data: &Expectation,
-        base: &Base,
-        probe: usize,
-    ) -> Option<Scan> {
+    fn scan(&self, simulate: &Simulate<'_>, data: &Expectation, base: &Base, probe: usize) -> Option<Scan> {
         const SETS: u64 = 3;
+        const FEW: u32 = 60;
         /// Excess, in units of what chance leaves, below which noise would hide which size is best.
         const LITTLE: f64 = 3.0;
         let without = if base.hypothesis.parts.is_empty() {
@@ -79,15 +79,15 @@ impl Atlas {
         let excess = self.left_beyond(data, base, &without).norm_squared() - chance;
         // Many sizes with one data set each, or fewer with two pairs of them.
         let (count, sets) = if excess < LITTLE * chance {
-            (60, [0..2, 2..4])
+            (FEW, [0..2, 2..4])
         } else {
-            (120, [0..1, 0..1])
+            (self.probes[probe].scanned, [0..1, 0..1])
         };
         let sizes = &self.probes[probe].sizes;
         let (low, high) = (sizes[0], sizes[sizes.len() - 1]);
         // Sizes in a constant ratio: what matters is how many steps fit into a speed or a reading.
         let ratio = (high / low).powf(1.0 / f64::from(count - 1));
-        let sizes: Vec<f64> = (0..count).map(|i| low * ratio.powi(i)).collect();
+        let sizes: Vec<f64> = (0..count).map(|i| low * ratio.powf(f64::from(i))).collect();
         Some(Scan {
             probe,
             ratio,
@@ -172,6 +172,11 @@ impl Search<'_> {
         self.scanned().iter().filter_map(closer).collect()
     }
 
+    /// Whether sizes all over the range of effects that jump were simulated already.
+    pub(super) fn was_scanned(&self) -> bool {
+        self.scanned.get().is_some()
+    }
+
     /// What every effect that jumps leaves at sizes all over its range; simulated once.
     fn scanned(&self) -> &[Scan] {
         self.scanned.get_or_init(|| {
@@ -185,32 +190,34 @@ impl Search<'_> {
         })
     }
 
-    /// Pairs of an effect that jumps and one that does not, those that promise most at the best of sizes ever closer. What both
-    /// do is taken to add up where they are looked for: no single effect need come near.
-    pub(super) fn pairs_that_jump(&self) -> Vec<Hypothesis> {
+    /// Pairs of an effect that jumps and one that does not, the most promising first, with the squared distance that they leave as far
+    /// as the other's size follows. What both do is taken to add up where they are looked for: no single effect need come near.
+    pub(super) fn hunts_of_pairs(&self) -> Vec<(f64, Hunt)> {
         const HEARD: usize = 8;
-        const KEPT: usize = 3;
-        /// Squared distance, and the share of what the best leaves, by which a pair may lie behind it.
-        const BEHIND: (f64, f64) = (100.0, 0.5);
-        self.tell(format_args!("which sizes that jump go with another effect"));
         let beside = (self.atlas).screen_beside_scans(self.residual, self.scanned(), HEARD);
+        self.tell(format_args!("which sizes that jump go with another effect"));
         let look = |beside: &Beside| {
-            let other = Part::screened(
-                self.atlas,
-                beside.other,
-                Shape::Constant,
-                &[beside.other_size],
-            );
+            let other = Part::screened(self.atlas, beside.other, Shape::Constant, &[beside.other_size]);
             let base = self.atlas.following(self.simulate, Hypothesis::of(other));
             let hunt = Hunt::new(base, beside.jumping, beside.size, beside.spacing);
             self.atlas.hunted_once(self.simulate, self.data, hunt)
         };
         let mut hunts: Vec<(f64, Hunt)> = beside.par_iter().filter_map(look).collect();
         hunts.sort_by(|a, b| a.0.total_cmp(&b.0));
+        hunts
+    }
+
+    /// The best of these pairs at the best of sizes ever closer.
+    pub(super) fn pairs_that_jump(&self, hunts: &[(f64, Hunt)]) -> Vec<Hypothesis> {
+        const KEPT: usize = 3;
+        /// Looks closer before the other effect's size follows.
+        const LOOKS: usize = 2;
+        /// Squared distance, and the share of what the best leaves, by which a pair may lie behind it.
+        const BEHIND: (f64, f64) = (100.0, 0.5);
         let least = hunts.first().map_or(0.0, |hunt| hunt.0);
         let bound = least + BEHIND.0.max(BEHIND.1 * (least - self.chance()));
         (hunts.iter().take(KEPT).filter(|hunt| hunt.0 <= bound))
-            .filter_map(|(_, hunt)| self.atlas.hunted(self.simulate, self.data, hunt))
+            .filter_map(|(_, hunt)| (self.atlas).hunted_for(self.simulate, self.data, hunt, LOOKS))
             .collect()
     }
 

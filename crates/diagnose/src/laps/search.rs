@@ -11,6 +11,7 @@ use rayon::prelude::*;
 use super::atlas::{Atlas, Simulate, White};
 use super::diagnosis::is_noise;
 use super::expectation::Expectation;
+use super::hunt::Moved;
 use super::hypothesis::{Freedom, Hypothesis, Part, Shape};
 use super::observed::ObservedLap;
 use super::pairs::ScreenedPair;
@@ -97,6 +98,9 @@ pub(super) const WEAK: f64 = 400.0;
 /// Log-likelihood above which it is strong: the right names leave next to nothing of another, and what is left by up to three
 /// tells of a cause that has none.
 pub(super) const STRONG: f64 = 2000.0;
+
+/// Log-likelihood within which an effect that jumps is worth a closer look at its size.
+const NEAR: f64 = 50.0;
 
 /// Errors of a difference in log-likelihood that may be chance.
 const ERRORS: f64 = 2.0;
@@ -240,23 +244,46 @@ impl Search<'_> {
     /// The best pairs, tried to the end: those that together explain most as far as actions add up, the best single effects
     /// with what explains their remainder best, and sizes that jump with another effect.
     pub(super) fn pairs(&self, singles: &[Found]) -> Vec<Found> {
-        let mut starts = self.best_together();
-        let (rounds, reached) = (&ROUNDS_OF_SEVERAL, f64::NEG_INFINITY);
-        let mut descents = self.descend_several(&starts, rounds, reached);
-        if !best_of(&descents).is_some_and(Descent::fits) {
+        let rounds = &ROUNDS_OF_SEVERAL;
+        let (mut starts, mut descents) = (Vec::new(), Vec::new());
+        let fits = |descents: &[Descent]| best_of(descents).is_some_and(Descent::fits);
+        let descend =
+            |further: Vec<Hypothesis>, starts: &mut Vec<Hypothesis>, descents: &mut Vec<Descent>| {
+                let reached = best_of(descents).map_or(f64::NEG_INFINITY, |best| best.score);
+                descents.extend(self.descend_several(&further, rounds, reached));
+                starts.extend(further);
+            };
+        let left_together = self.together().first().map_or(f64::INFINITY, |best| best.left);
+        let hunts = if self.was_scanned() {
+            self.hunts_of_pairs()
+        } else {
+            Vec::new()
+        };
+        let jumps_first = hunts.first().is_some_and(|(left, _)| *left < left_together);
+        if jumps_first {
+            descend(self.pairs_that_jump(&hunts), &mut starts, &mut descents);
+        }
+        if !fits(&descents) {
+            descend(self.best_together(), &mut starts, &mut descents);
+        }
+        if !fits(&descents) {
             let mut further = starts.clone();
             for single in of_other_effects(singles.iter()).into_iter().take(BASES) {
                 let base = self.base(single.hypothesis.clone());
                 let beside = self.beside(&base, &single.left, &further);
                 further.extend(beside);
             }
-            for further in [further.split_off(starts.len()), self.pairs_that_jump()] {
-                let best = best_of(&descents).map_or(reached, |best| best.score);
-                descents.extend(self.descend_several(&further, rounds, best));
-                starts.extend(further);
-            }
+            descend(further.split_off(starts.len()), &mut starts, &mut descents);
         }
-        self.with_exchanged(descents, &starts, rounds, reached)
+        if !fits(&descents) && !jumps_first {
+            let hunts = if hunts.is_empty() {
+                self.hunts_of_pairs()
+            } else {
+                hunts
+            };
+            descend(self.pairs_that_jump(&hunts), &mut starts, &mut descents);
+        }
+        self.with_exchanged(descents, &starts, rounds, f64::NEG_INFINITY)
     }
 
     /// The best of the pairs that are looked for together.
@@ -316,6 +343,10 @@ impl Search<'_> {
         // lacks none.
         let worth_more = |best: &&Descent| best.score > reached && !best.leaves_far_too_much();
         if let Some(best) = best_of(&descents).filter(worth_more) {
+            self.tell(format_args!(
+                "what else goes with either of {}",
+                self.in_words(std::slice::from_ref(best))
+            ));
             let exchanged = self.exchanged(best, starts);
             descents.extend(self.descend_several(&exchanged, rounds, best.score));
         }
@@ -342,7 +373,12 @@ impl Search<'_> {
 
     /// Descends from hypotheses of several effects; the best one is tried without its patterns too, one of them or all, and with
     /// its pattern given to another of its effects: what another effect left may have suggested it.
-    pub(super) fn descend_several(&self, starts: &[Hypothesis], rounds: &Rounds, reached: f64) -> Vec<Descent> {
+    pub(super) fn descend_several(
+        &self,
+        starts: &[Hypothesis],
+        rounds: &Rounds,
+        reached: f64,
+    ) -> Vec<Descent> {
         let mut descents = self.descend(starts.iter(), rounds, reached);
         if let Some(best) = best_of(&descents) {
             let plain = best.hypothesis.without_patterns(self.atlas).into_iter();
@@ -568,28 +604,42 @@ impl Search<'_> {
             .map(|settled| self.found(settled))
             .collect();
         sort(&mut found);
-        found
+        let mut kept: Vec<Found> = Vec::new();
+        for found in found {
+            let repeats = |better: &Found| found.hypothesis.is_near(&better.hypothesis, self.atlas);
+            if !kept.iter().any(repeats) {
+                kept.push(found);
+            }
+        }
+        kept
     }
 
     /// Descents with better sizes of the effects that jump, which were found beside others that have moved since: those of
-    /// the best descent, for all, until they come to rest; and those of rivals, for themselves.
+    /// the best descent, for all that are near it, until they come to rest; and those of rivals, for themselves.
     fn hunted_again(&self, mut descents: Vec<Descent>) -> Vec<Descent> {
-        const MOST: usize = 3;
+        /// How far the other effects have moved from one time to the next.
+        const MOVED: [Moved; 3] = [Moved::Far, Moved::Little, Moved::Little];
+        const SHARE: f64 = 0.03;
         let held = |part: &Part| part.held.is_some();
-        for _ in 0..MOST {
+        for moved in MOVED {
             let best = best_of(&descents).map(|best| &best.hypothesis);
             let Some(best) = best.filter(|best| best.parts.len() > 1 && best.parts.iter().any(held)) else {
                 break;
             };
             let before = best_of(&descents).map_or(0.0, |best| best.score);
-            let Some(hunted) = self.atlas.hunt_again(self.simulate, self.data, best) else {
+            self.tell(format_args!("closer sizes of what jumps"));
+            let Some(hunted) = (self.atlas).hunt_again(self.simulate, self.data, best, moved) else {
                 break;
             };
             let rest =
                 (hunted.parts.iter().zip(&best.parts)).all(|(now, before)| now.is_within_error_of(before));
             let known: Vec<Part> = hunted.parts.into_iter().filter(held).collect();
+            let least = before - NEAR.max(SHARE * before);
             descents = (descents.into_par_iter())
                 .filter_map(|descent| {
+                    if descent.score < least {
+                        return Some(descent);
+                    }
                     let start = Descent::start(self.atlas, &descent.hypothesis.with_held(&known));
                     self.atlas.descend(self.simulate, self.data, start, Round::Full)
                 })
@@ -604,7 +654,6 @@ impl Search<'_> {
 
     /// Descents of which those that are near the best have better sizes of their own of the effects that jump.
     fn with_rivals_hunted(&self, mut descents: Vec<Descent>) -> Vec<Descent> {
-        const NEAR: f64 = 50.0;
         const MOST: usize = 2;
         descents.sort_by(|a, b| b.score.total_cmp(&a.score));
         let best = descents.first().map_or(0.0, |best| best.score);
@@ -613,9 +662,8 @@ impl Search<'_> {
             best - descent.score < NEAR && parts.len() > 1 && parts.iter().any(|part| part.held.is_some())
         };
         let hunted = |rival: &Descent| {
-            let hunted = self
-                .atlas
-                .hunt_again(self.simulate, self.data, &rival.hypothesis)?;
+            let hunted =
+                (self.atlas).hunt_again(self.simulate, self.data, &rival.hypothesis, Moved::Little)?;
             let start = Descent::start(self.atlas, &hunted);
             self.atlas.descend(self.simulate, self.data, start, Round::Full)
         };
