@@ -94,11 +94,12 @@ impl Recording {
         if !finite || vectors.is_empty() || vectors.iter().any(|laps| laps.len() < 3) {
             return None;
         }
+        let near = brought_near(&vectors);
         let size = vectors[0][0].len();
         let mut scatter = DMatrix::zeros(size, size);
         let mut freedom = 0;
         let mut summaries = Vec::with_capacity(vectors.len());
-        for laps in &vectors {
+        for laps in &near {
             let summary = summarise(laps);
             let ramp = ramp(laps.len());
             let residuals = DMatrix::from_fn(size, laps.len(), |i, j| {
@@ -108,7 +109,7 @@ impl Recording {
             freedom += laps.len() - 2;
             summaries.push(summary);
         }
-        let second = second_order(&vectors, &noise);
+        let second = second_order(&near, &noise);
         Some(Self {
             runs: summaries,
             second,
@@ -116,6 +117,63 @@ impl Recording {
             freedom,
         })
     }
+}
+
+/// Laps of which those that went far astray are brought nearer to the middle of their run, as a whole: one of them would decide
+/// a mean. How far is far is told by how all the others scatter.
+fn brought_near(runs: &[Vec<DVector<f64>>]) -> Vec<Vec<DVector<f64>>> {
+    /// Deviations, all along one of the stretches.
+    const FAR: f64 = 5.0;
+    let size = runs[0][0].len();
+    let middles: Vec<DVector<f64>> = runs.iter().map(|laps| middle(laps)).collect();
+    let squares: Vec<Vec<DVector<f64>>> = (runs.iter().zip(&middles))
+        .map(|(laps, middle)| {
+            let square = |lap: &DVector<f64>| (lap - middle).map(|x| x * x);
+            laps.iter().map(square).collect()
+        })
+        .collect();
+    let variances = DVector::from_fn(size, |i, _| {
+        trimmed_mean(squares.iter().flatten().map(|square| square[i]).collect())
+    });
+    let mut near = runs.to_vec();
+    for ((laps, squares), middle) in near.iter_mut().zip(&squares).zip(&middles) {
+        for (lap, square) in laps.iter_mut().zip(squares) {
+            let deviations = square.component_div(&variances);
+            let most = stretches(size)
+                .map(|part| deviations.rows(part.start, part.len()).mean())
+                .fold(0.0, f64::max);
+            if most > FAR * FAR {
+                *lap = middle + (&*lap - middle) * (FAR / most.sqrt());
+            }
+        }
+    }
+    near
+}
+
+/// Medians of the entries of some laps.
+fn middle(laps: &[DVector<f64>]) -> DVector<f64> {
+    let median_of = |i: usize, _| median(&mut laps.iter().map(|lap| lap[i]).collect::<Vec<f64>>());
+    DVector::from_fn(laps[0].len(), median_of)
+}
+
+/// The mean of some values but for the largest, one in forty.
+fn trimmed_mean(mut values: Vec<f64>) -> f64 {
+    let kept = values.len() - values.len() / 40;
+    if kept < values.len() {
+        values.select_nth_unstable_by(kept, f64::total_cmp);
+    }
+    values[..kept].iter().sum::<f64>() / kept as f64
+}
+
+/// The middle one of some values, of an even number the mean of the middle two.
+fn median(values: &mut [f64]) -> f64 {
+    let (half, odd) = (values.len() / 2, values.len() % 2 == 1);
+    let (below, &mut upper, _) = values.select_nth_unstable_by(half, f64::total_cmp);
+    if odd {
+        return upper;
+    }
+    let lower = below.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    0.5 * (lower + upper)
 }
 
 /// Positions of n laps in their run, centred and of unit norm.
@@ -248,6 +306,39 @@ impl Moments {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A run of laps that deviate by no more than 1 from 3.
+    fn usual_run(seed: u64) -> Vec<DVector<f64>> {
+        let mut stream = sim::Streams { seed, run: 0 }.open("laps");
+        let mut lap = || DVector::from_fn(100 + BLOCKS, |_, _| 3.0 + stream.symmetric());
+        (0..20).map(|_| lap()).collect()
+    }
+
+    #[test]
+    fn a_lap_far_astray_hardly_moves_the_mean_and_no_other_lap_moves() {
+        let usual = vec![usual_run(1), usual_run(2)];
+        assert_eq!(brought_near(&usual), usual);
+        let mut astray = usual.clone();
+        // Eighty times as far as the others scatter (by 0.58) in ten gates.
+        astray[1][7].rows_mut(40, 10).add_scalar_mut(46.0);
+        let near = brought_near(&astray);
+        let most = near[1][7].rows(40, 10).map(|x| (x - 3.0).abs()).max();
+        assert!((2.0..4.0).contains(&most), "{most}");
+        for (run, laps) in near.iter().enumerate() {
+            for (at, lap) in laps.iter().enumerate().filter(|(at, _)| (run, *at) != (1, 7)) {
+                assert_eq!(lap, &usual[run][at]);
+            }
+        }
+    }
+
+    #[test]
+    fn medians_and_trimmed_means() {
+        assert_eq!(median(&mut [3.0, 1.0, 2.0]), 2.0);
+        assert_eq!(median(&mut [4.0, 1.0, 2.0, 3.0]), 2.5);
+        let mut values: Vec<f64> = (0..79).map(|_| 2.0).collect();
+        values.extend([90.0]);
+        assert_eq!(trimmed_mean(values), 2.0);
+    }
 
     #[test]
     fn one_lap_far_astray_does_not_decide_the_kurtosis() {
