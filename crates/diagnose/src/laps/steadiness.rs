@@ -7,7 +7,7 @@ use super::atlas::{Atlas, Simulate};
 use super::expectation::Expectation;
 use super::hypothesis::Hypothesis;
 use super::observed::ObservedLap;
-use super::summary::lap_vector;
+use super::summary::lap_vectors;
 use super::tests_of_fit::Quadratic;
 
 /// A size that settles while a run goes on: what it is more at first decays.
@@ -99,20 +99,33 @@ impl Atlas {
 
     /// The laps of each run of a data set projected on a direction of their own.
     fn sizes_along(&self, directions: &[DVector<f64>], data: &Runs) -> Vec<DVector<f64>> {
+        let vectors = self.lap_vectors(data);
         let of_run = |(run, (recording, _)): (usize, (usize, usize))| {
             let scatter = &self.scatter[recording];
-            let size = |lap: &ObservedLap| directions[run].dot(&scatter.whiten(&lap_vector(lap)));
-            DVector::from_iterator(data[run].len(), data[run].iter().map(size))
+            let size = |lap: &DVector<f64>| directions[run].dot(&scatter.whiten(lap));
+            DVector::from_iterator(vectors[run].len(), vectors[run].iter().map(size))
         };
         self.layout.places().enumerate().map(of_run).collect()
     }
 
+    /// The laps of all runs as vectors.
+    fn lap_vectors(&self, data: &Runs) -> Vec<Vec<DVector<f64>>> {
+        let mut rest = data;
+        let of_recording = |laps: &Vec<usize>| {
+            let (own, others) = rest.split_at(laps.len());
+            rest = others;
+            lap_vectors(own)
+        };
+        self.layout.laps.iter().flat_map(of_recording).collect()
+    }
+
     /// What an effect does to the mean lap of each run, in units of a lap's scatter.
     fn directions_of(&self, with: &[Vec<Vec<ObservedLap>>], without: &Expectation) -> Vec<DVector<f64>> {
+        let sets: Vec<Vec<Vec<DVector<f64>>>> = with.iter().map(|data| self.lap_vectors(data)).collect();
         let direction = |(run, (recording, place)): (usize, (usize, usize))| {
-            let laps = with.iter().flat_map(|data| &data[run]);
+            let laps = sets.iter().flat_map(|data| &data[run]);
             let count = laps.clone().count() as f64;
-            let mean = laps.map(lap_vector).sum::<DVector<f64>>() / count;
+            let mean = laps.sum::<DVector<f64>>() / count;
             self.scatter[recording].whiten(&(mean - &without.0[recording].means[place]))
         };
         self.layout.places().enumerate().map(direction).collect()

@@ -85,20 +85,18 @@ pub(super) struct Recording {
 
 impl Recording {
     fn new(runs: &[Vec<ObservedLap>]) -> Option<Self> {
-        let of_each = |vector: fn(&ObservedLap) -> DVector<f64>| -> Vec<Vec<DVector<f64>>> {
-            let of_run = |laps: &Vec<ObservedLap>| laps.iter().map(vector).collect();
-            runs.iter().map(of_run).collect()
-        };
-        let (vectors, noise) = (of_each(lap_vector), of_each(noise_vector));
-        let finite = (vectors.iter().chain(&noise).flatten()).all(|lap| lap.iter().all(|x| x.is_finite()));
-        if !finite || vectors.is_empty() || vectors.iter().any(|laps| laps.len() < 3) {
+        if runs.is_empty() || runs.iter().any(|laps| laps.len() < 3) {
             return None;
         }
-        let near = brought_near(&vectors);
-        let size = vectors[0][0].len();
+        let (near, noise) = (lap_vectors(runs), of_each(runs, noise_vector));
+        let finite = (near.iter().chain(&noise).flatten()).all(|lap| lap.iter().all(|x| x.is_finite()));
+        if !finite {
+            return None;
+        }
+        let size = near[0][0].len();
         let mut scatter = DMatrix::zeros(size, size);
         let mut freedom = 0;
-        let mut summaries = Vec::with_capacity(vectors.len());
+        let mut summaries = Vec::with_capacity(near.len());
         for laps in &near {
             let summary = summarise(laps);
             let ramp = ramp(laps.len());
@@ -117,6 +115,16 @@ impl Recording {
             freedom,
         })
     }
+}
+
+/// The laps of the runs of one recording as vectors, those that went far astray brought nearer.
+pub(super) fn lap_vectors(runs: &[Vec<ObservedLap>]) -> Vec<Vec<DVector<f64>>> {
+    brought_near(&of_each(runs, lap_vector))
+}
+
+fn of_each(runs: &[Vec<ObservedLap>], vector: fn(&ObservedLap) -> DVector<f64>) -> Vec<Vec<DVector<f64>>> {
+    let of_run = |laps: &Vec<ObservedLap>| laps.iter().map(vector).collect();
+    runs.iter().map(of_run).collect()
 }
 
 /// Laps of which those that went far astray are brought nearer to the middle of their run, as a whole: one of them would decide
