@@ -1,12 +1,15 @@
-//! Two probes at once, over the paths that were simulated beforehand.
+//! Two effects at once: over the paths that were simulated beforehand, and by simulation.
 
 use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
 use rayon::prelude::*;
 
 use super::atlas::{Atlas, White};
 use super::hypothesis::{Hypothesis, Part, Shape};
+use super::refine::Descent;
 use super::screen::{BEYOND, price, tangent};
-use super::search::Search;
+use super::search::{
+    BASES, Found, ROUNDS_BESIDE, ROUNDS_OF_SEVERAL, Rounds, STRONG, Search, best_of, of_other_effects,
+};
 
 /// A straight piece of a probe's path.
 pub(super) struct Piece {
@@ -151,7 +154,145 @@ impl Atlas {
     }
 }
 
+/// Hypotheses of several effects that were descended from, and where that led.
+struct Tried {
+    rounds: &'static Rounds,
+    /// A score that was reached without them.
+    reached: f64,
+    starts: Vec<Hypothesis>,
+    descents: Vec<Descent>,
+}
+
+impl Tried {
+    fn new(rounds: &'static Rounds, reached: f64) -> Self {
+        Self {
+            rounds,
+            reached,
+            starts: Vec::new(),
+            descents: Vec::new(),
+        }
+    }
+
+    /// Whether the best leaves nothing significant.
+    fn fits(&self) -> bool {
+        best_of(&self.descents).is_some_and(Descent::fits)
+    }
+}
+
 impl Search<'_> {
+    /// Pairs that are looked for together, and explain nearly all of a strong signal where they are simulated, tried to the end.
+    pub(super) fn clear_pairs(&self) -> Vec<Found> {
+        const NEARLY_ALL: f64 = 0.95;
+        let all = 0.5 * (self.residual.norm_squared() - self.residual.len() as f64);
+        if all < STRONG {
+            return Vec::new();
+        }
+        let best = self.together().first();
+        if best.is_none_or(|best| best.score < NEARLY_ALL * all) {
+            return Vec::new();
+        }
+        let mut tried = Tried::new(&ROUNDS_OF_SEVERAL, f64::NEG_INFINITY);
+        self.descend_on(&mut tried, self.best_together());
+        self.with_exchanged(tried)
+    }
+
+    /// The best pairs, tried to the end until one leaves nothing significant: those that together explain most as far as actions add
+    /// up, the best single effects with what explains their remainder best, and sizes that jump with another effect, which come
+    /// first where they promise more.
+    pub(super) fn pairs(&self, singles: &[Found]) -> Vec<Found> {
+        let mut tried = Tried::new(&ROUNDS_OF_SEVERAL, f64::NEG_INFINITY);
+        let left_together = self.together().first().map_or(f64::INFINITY, |best| best.left);
+        let hunts = self.was_scanned().then(|| self.hunts_of_pairs());
+        let first = hunts.iter().flatten().next();
+        let jumps_first = first.is_some_and(|(left, _)| *left < left_together);
+        if let Some(hunts) = hunts.as_ref().filter(|_| jumps_first) {
+            self.descend_on(&mut tried, self.pairs_that_jump(hunts));
+        }
+        if !tried.fits() {
+            self.descend_on(&mut tried, self.best_together());
+        }
+        if !tried.fits() {
+            let mut known = tried.starts.clone();
+            for single in of_other_effects(singles.iter()).into_iter().take(BASES) {
+                let base = self.base(single.hypothesis.clone());
+                let beside = self.beside(&base, &single.left, &known);
+                known.extend(beside);
+            }
+            let further = known.split_off(tried.starts.len());
+            self.descend_on(&mut tried, further);
+        }
+        if !tried.fits() && !jumps_first {
+            let hunts = hunts.unwrap_or_else(|| self.hunts_of_pairs());
+            self.descend_on(&mut tried, self.pairs_that_jump(&hunts));
+        }
+        self.with_exchanged(tried)
+    }
+
+    /// The best of the pairs that are looked for together.
+    fn best_together(&self) -> Vec<Hypothesis> {
+        const PAIRS: usize = 5;
+        let best = self.together().iter().take(PAIRS);
+        best.map(|pair| pair.hypothesis.clone()).collect()
+    }
+
+    /// Pairs that together explain most as far as actions add up, as simulations where they were screened rank them; simulated
+    /// once.
+    fn together(&self) -> &[ScreenedPair] {
+        const HEARD: usize = 48;
+        self.together.get_or_init(|| {
+            self.tell(format_args!("which two effects go together"));
+            self.heard_pairs(self.atlas.screen_pairs(self.residual, HEARD))
+        })
+    }
+
+    /// The best pairs of a single effect that explains nearly all, tried to the end: those with what explains best what it
+    /// leaves, if anything gains there what a further effect must, and a fair share of what the faults of models may. Beside an
+    /// effect that stands alone it must promise more, and by one size: effects change the scatter, and sizes that go over the
+    /// runs follow that.
+    pub(super) fn pairs_with(&self, single: &Found, stands: bool, faults: f64) -> Vec<Found> {
+        const FAIR_SHARE: f64 = 0.3;
+        /// Score of the least that could turn out to be worth its numbers.
+        const PROMISING: f64 = 5.0;
+        const PROMISING_BESIDE: f64 = 10.0;
+        let least = FAIR_SHARE * faults;
+        self.tell(format_args!("what is beside {}", single.explanation.label()));
+        let base = self.base(single.hypothesis.clone());
+        let mut screened = self.screened_beside(&base, &single.left);
+        screened.retain(|other| !stands || other.hypothesis.is_constant());
+        let enough = if stands { PROMISING_BESIDE } else { PROMISING };
+        if screened.first().is_none_or(|best| best.score < enough.max(least)) {
+            return Vec::new();
+        }
+        let heard = self.heard_beside(&base, screened);
+        if heard.first().is_none_or(|best| best.score < PROMISING.max(least)) {
+            return Vec::new();
+        }
+        let mut tried = Tried::new(&ROUNDS_BESIDE, single.explanation.score);
+        self.descend_on(&mut tried, self.beside_of(&heard, &base, &single.left, &[]));
+        self.with_exchanged(tried)
+    }
+
+    /// Descends from further hypotheses.
+    fn descend_on(&self, tried: &mut Tried, further: Vec<Hypothesis>) {
+        let best = best_of(&tried.descents).map_or(tried.reached, |best| best.score);
+        (tried.descents).extend(self.descend_several(&further, tried.rounds, best));
+        tried.starts.extend(further);
+    }
+
+    /// Pairs with either effect of the best one exchanged for others than were tried, tried to the end.
+    fn with_exchanged(&self, mut tried: Tried) -> Vec<Found> {
+        // What leaves far too much lacks a third effect rather than another second one, and what is no better than fewer effects
+        // lacks none.
+        let worth_more = |best: &&Descent| best.score > tried.reached && !best.leaves_far_too_much();
+        if let Some(best) = best_of(&tried.descents).filter(worth_more) {
+            let names = self.in_words(std::slice::from_ref(best));
+            self.tell(format_args!("what else goes with either of {names}"));
+            let exchanged = self.exchanged(best, &tried.starts);
+            self.descend_on(&mut tried, exchanged);
+        }
+        self.settle(tried.descents)
+    }
+
     /// Pairs that were screened with the scores and sizes that simulations of both together give them, best first: actions do not quite
     /// add up.
     pub(super) fn heard_pairs(&self, screened: Vec<ScreenedPair>) -> Vec<ScreenedPair> {
@@ -230,5 +371,34 @@ impl Products {
             - 2.0 * self.from_from[(i, j)];
         let gain = constant + 2.0 * (s * g[0] + t * g[1]) - s * s * a - t * t * b - 2.0 * s * t * c;
         (gain, shares)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_best_point_of_a_piece_is_the_projection_within_its_bounds() {
+        // From (1, 0) at size 2 straight up to (1, 4) at size 4, and half a piece beyond.
+        let piece = Piece {
+            probe: 0,
+            from_size: 2.0,
+            to_size: 4.0,
+            low: 0.0,
+            high: 1.5,
+            from: White::from_vec(vec![1.0, 0.0]),
+            along: White::from_vec(vec![0.0, 4.0]),
+        };
+        for (target, size, nearest) in [
+            ([2.0, 3.0], 3.5, [1.0, 3.0]),
+            ([0.0, 9.0], 5.0, [1.0, 6.0]),
+            ([5.0, -1.0], 2.0, [1.0, 0.0]),
+        ] {
+            let [target, nearest] = [target, nearest].map(|v| White::from_vec(v.to_vec()));
+            let (gain, found) = piece.best(piece.along.dot(&target), piece.from.dot(&target));
+            let gained = target.norm_squared() - (&target - nearest).norm_squared();
+            assert!((found - size).abs() < 1e-12 && (gain - gained).abs() < 1e-12);
+        }
     }
 }

@@ -65,6 +65,7 @@ impl Scan {
 }
 
 impl Atlas {
+    /// What a probe that jumps leaves beside a base; `None` where the base crashes.
     fn scan(&self, simulate: &Simulate<'_>, data: &Expectation, base: &Base, probe: usize) -> Option<Scan> {
         const SETS: u64 = 3;
         const FEW: u32 = 60;
@@ -95,9 +96,7 @@ impl Atlas {
             looks: self.looks(simulate, data, base, probe, &sizes, &sets),
         })
     }
-}
 
-impl Atlas {
     /// The constant probes that do not jump which explain a residual best beside every scanned one, best first: of a probe that
     /// jumps few at a size and about it.
     fn screen_beside_scans(&self, residual: &White, scans: &[Scan], most: usize) -> Vec<Beside> {

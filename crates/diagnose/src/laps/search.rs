@@ -33,7 +33,7 @@ pub(super) struct Found {
     /// Standard deviation of its log-likelihood for the simulation's own error.
     pub(super) gain_error: f64,
     /// What it leaves of the data, in units of the declared model's scatter.
-    left: White,
+    pub(super) left: White,
     /// The same in units of its own scatter and of the simulation's error.
     residual: White,
 }
@@ -55,7 +55,7 @@ pub(super) struct Search<'a> {
 
 /// Rounds of a descent, each with the log-likelihood, and the share of the best one's, by which what lies behind then does
 /// not come back.
-type Rounds = [(Round, f64, f64)];
+pub(super) type Rounds = [(Round, f64, f64)];
 
 /// Those of single effects.
 const ROUNDS: [(Round, f64, f64); 5] = [
@@ -77,7 +77,7 @@ pub(super) const ROUNDS_OF_SEVERAL: [(Round, f64, f64); 6] = [
 ];
 
 /// The same beside an effect that explains nearly all, from where there is not far to go.
-const ROUNDS_BESIDE: [(Round, f64, f64); 6] = [
+pub(super) const ROUNDS_BESIDE: [(Round, f64, f64); 6] = [
     (Round::Rough, 50.0, 0.001),
     (Round::Again, 30.0, 0.0005),
     (Round::Again, 25.0, 0.0002),
@@ -222,135 +222,6 @@ impl Search<'_> {
             Quadratic::new(squares.sum(), sizes.len() - 1),
             Quadratic::new(trends.sum(), layout.laps.len()),
         ]
-    }
-
-    /// Pairs that are looked for together, and explain nearly all of a strong signal where they are simulated, tried to the end.
-    pub(super) fn clear_pairs(&self) -> Vec<Found> {
-        const NEARLY_ALL: f64 = 0.95;
-        let all = 0.5 * (self.residual.norm_squared() - self.residual.len() as f64);
-        if all < STRONG {
-            return Vec::new();
-        }
-        let best = self.together().first();
-        if best.is_none_or(|best| best.score < NEARLY_ALL * all) {
-            return Vec::new();
-        }
-        let starts = self.best_together();
-        let reached = f64::NEG_INFINITY;
-        let descents = self.descend_several(&starts, &ROUNDS_OF_SEVERAL, reached);
-        self.with_exchanged(descents, &starts, &ROUNDS_OF_SEVERAL, reached)
-    }
-
-    /// The best pairs, tried to the end: those that together explain most as far as actions add up, the best single effects
-    /// with what explains their remainder best, and sizes that jump with another effect.
-    pub(super) fn pairs(&self, singles: &[Found]) -> Vec<Found> {
-        let rounds = &ROUNDS_OF_SEVERAL;
-        let (mut starts, mut descents) = (Vec::new(), Vec::new());
-        let fits = |descents: &[Descent]| best_of(descents).is_some_and(Descent::fits);
-        let descend =
-            |further: Vec<Hypothesis>, starts: &mut Vec<Hypothesis>, descents: &mut Vec<Descent>| {
-                let reached = best_of(descents).map_or(f64::NEG_INFINITY, |best| best.score);
-                descents.extend(self.descend_several(&further, rounds, reached));
-                starts.extend(further);
-            };
-        let left_together = self.together().first().map_or(f64::INFINITY, |best| best.left);
-        let hunts = if self.was_scanned() {
-            self.hunts_of_pairs()
-        } else {
-            Vec::new()
-        };
-        let jumps_first = hunts.first().is_some_and(|(left, _)| *left < left_together);
-        if jumps_first {
-            descend(self.pairs_that_jump(&hunts), &mut starts, &mut descents);
-        }
-        if !fits(&descents) {
-            descend(self.best_together(), &mut starts, &mut descents);
-        }
-        if !fits(&descents) {
-            let mut further = starts.clone();
-            for single in of_other_effects(singles.iter()).into_iter().take(BASES) {
-                let base = self.base(single.hypothesis.clone());
-                let beside = self.beside(&base, &single.left, &further);
-                further.extend(beside);
-            }
-            descend(further.split_off(starts.len()), &mut starts, &mut descents);
-        }
-        if !fits(&descents) && !jumps_first {
-            let hunts = if hunts.is_empty() {
-                self.hunts_of_pairs()
-            } else {
-                hunts
-            };
-            descend(self.pairs_that_jump(&hunts), &mut starts, &mut descents);
-        }
-        self.with_exchanged(descents, &starts, rounds, f64::NEG_INFINITY)
-    }
-
-    /// The best of the pairs that are looked for together.
-    fn best_together(&self) -> Vec<Hypothesis> {
-        const PAIRS: usize = 5;
-        let best = self.together().iter().take(PAIRS);
-        best.map(|pair| pair.hypothesis.clone()).collect()
-    }
-
-    /// Pairs that together explain most as far as actions add up, as simulations where they were screened rank them; simulated
-    /// once.
-    fn together(&self) -> &[ScreenedPair] {
-        const HEARD: usize = 48;
-        self.together.get_or_init(|| {
-            self.tell(format_args!("which two effects go together"));
-            self.heard_pairs(self.atlas.screen_pairs(self.residual, HEARD))
-        })
-    }
-
-    /// The best pairs of a single effect that explains nearly all, tried to the end: those with what explains best what it
-    /// leaves, if anything gains there what a further effect must, and a fair share of what the faults of models may. Beside an
-    /// effect that stands alone it must promise more, and by one size: effects change the scatter, and sizes that go over the
-    /// runs follow that.
-    pub(super) fn pairs_with(&self, single: &Found, stands: bool, faults: f64) -> Vec<Found> {
-        const FAIR_SHARE: f64 = 0.3;
-        /// Score of the least that could turn out to be worth its numbers.
-        const PROMISING: f64 = 5.0;
-        const PROMISING_BESIDE: f64 = 10.0;
-        let least = FAIR_SHARE * faults;
-        self.tell(format_args!("what is beside {}", single.explanation.label()));
-        let base = self.base(single.hypothesis.clone());
-        let mut screened = self.screened_beside(&base, &single.left);
-        screened.retain(|other| !stands || other.hypothesis.is_constant());
-        let enough = if stands { PROMISING_BESIDE } else { PROMISING };
-        if screened.first().is_none_or(|best| best.score < enough.max(least)) {
-            return Vec::new();
-        }
-        let heard = self.heard_beside(&base, screened);
-        if heard.first().is_none_or(|best| best.score < PROMISING.max(least)) {
-            return Vec::new();
-        }
-        let starts = self.beside_of(&heard, &base, &single.left, &[]);
-        let reached = single.explanation.score;
-        let descents = self.descend_several(&starts, &ROUNDS_BESIDE, reached);
-        self.with_exchanged(descents, &starts, &ROUNDS_BESIDE, reached)
-    }
-
-    /// Pairs with either effect of the best one exchanged for others than were tried, tried to the end.
-    fn with_exchanged(
-        &self,
-        mut descents: Vec<Descent>,
-        starts: &[Hypothesis],
-        rounds: &Rounds,
-        reached: f64,
-    ) -> Vec<Found> {
-        // What leaves far too much lacks a third effect rather than another second one, and what is no better than fewer effects
-        // lacks none.
-        let worth_more = |best: &&Descent| best.score > reached && !best.leaves_far_too_much();
-        if let Some(best) = best_of(&descents).filter(worth_more) {
-            self.tell(format_args!(
-                "what else goes with either of {}",
-                self.in_words(std::slice::from_ref(best))
-            ));
-            let exchanged = self.exchanged(best, starts);
-            descents.extend(self.descend_several(&exchanged, rounds, best.score));
-        }
-        self.settle(descents)
     }
 
     /// Explanations with what explains best what they leave beside them, tried to the end.
@@ -559,7 +430,7 @@ impl Search<'_> {
     }
 
     /// The effects that are descended from, a few by name.
-    fn in_words(&self, alive: &[Descent]) -> String {
+    pub(super) fn in_words(&self, alive: &[Descent]) -> String {
         const NAMED: usize = 3;
         let mut all: Vec<String> = Vec::new();
         for descent in alive {
@@ -778,12 +649,12 @@ fn may_catch_up(descent: &Descent, best: f64) -> bool {
 }
 
 /// The descent with the best score.
-fn best_of(descents: &[Descent]) -> Option<&Descent> {
+pub(super) fn best_of(descents: &[Descent]) -> Option<&Descent> {
     descents.iter().max_by(|a, b| a.score.total_cmp(&b.score))
 }
 
 /// Of explanations those that do not have the effects of an earlier one, whatever their patterns.
-fn of_other_effects<'f>(found: impl Iterator<Item = &'f Found>) -> Vec<&'f Found> {
+pub(super) fn of_other_effects<'f>(found: impl Iterator<Item = &'f Found>) -> Vec<&'f Found> {
     let mut known: BTreeSet<Vec<&str>> = BTreeSet::new();
     let is_new = |found: &&Found| {
         let mut names = found.explanation.names();
