@@ -221,7 +221,7 @@ impl Search<'_> {
             let further = known.split_off(tried.starts.len());
             self.descend_on(&mut tried, further);
         }
-        if !tried.fits() && !jumps_first {
+        if !tried.fits() && !jumps_first && !self.explains_most(&tried) {
             let hunts = hunts.unwrap_or_else(|| self.hunts_of_pairs());
             self.descend_on(&mut tried, self.pairs_that_jump(&hunts));
         }
@@ -270,6 +270,17 @@ impl Search<'_> {
         let mut tried = Tried::new(&ROUNDS_BESIDE, single.explanation.score);
         self.descend_on(&mut tried, self.beside_of(&heard, &base, &single.left, &[]));
         self.with_exchanged(tried)
+    }
+
+    /// Whether the best leaves so little of a strong signal that an effect that jumps does not stand for either of its own.
+    fn explains_most(&self, tried: &Tried) -> bool {
+        const LITTLE: f64 = 0.1;
+        let all = self.residual.norm_squared() - self.residual.len() as f64;
+        let left = |best: &Descent| best.remainder.map(|left| left.excess());
+        best_of(&tried.descents)
+            .filter(|best| best.score > STRONG)
+            .and_then(left)
+            .is_some_and(|left| left < LITTLE * all)
     }
 
     /// Descends from further hypotheses.
