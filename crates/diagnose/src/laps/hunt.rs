@@ -94,7 +94,8 @@ impl Atlas {
         data: &Expectation,
         mut hunt: Hunt,
     ) -> Option<(f64, Hunt)> {
-        let found = self.look_closer(simulate, data, &mut hunt, CLOSER[0])?;
+        let sets = CLOSER[hunt.looks];
+        let found = self.look_closer(simulate, data, &mut hunt, sets)?;
         Some((least(&found)?.0, hunt))
     }
 
@@ -144,7 +145,7 @@ impl Atlas {
             };
             let distances = |sizes: &[f64]| {
                 const SETS: u64 = 6;
-                self.distances(simulate, data, &hunt.base, hunt.probe, sizes, &[0..SETS, 0..SETS])
+                self.distances(simulate, data, &hunt, sizes, SETS)
             };
             if let Some((size, error)) = smooth_size(distances, hunt.size, hunt.spacing) {
                 smooth.parts[i] = Part::held(self, hunt.probe, size, error);
@@ -213,31 +214,23 @@ impl Atlas {
         let sizes: Vec<f64> = (-4..=4)
             .map(|i| hunt.size + hunt.spacing * f64::from(i) / 3.0)
             .collect();
-        let found = self.distances(
-            simulate,
-            data,
-            &hunt.base,
-            hunt.probe,
-            &sizes,
-            &[0..sets, 0..sets],
-        );
+        let found = self.distances(simulate, data, hunt, &sizes, sets);
         hunt.size = least(&found)?.1;
         hunt.spacing /= 3.0;
         hunt.looks += 1;
         Some(found)
     }
 
-    /// Squared distances of the data from a hypothesis with a probe beside it at some sizes, each with its size; see [`Look`].
+    /// Squared distances that a hunt leaves at some sizes, each with its size, by so many data sets.
     fn distances(
         &self,
         simulate: &Simulate<'_>,
         data: &Expectation,
-        base: &Base,
-        probe: usize,
+        hunt: &Hunt,
         sizes: &[f64],
-        sets: &[Range<u64>; 2],
+        sets: u64,
     ) -> Vec<(f64, f64)> {
-        let looks = self.looks(simulate, data, base, probe, sizes, sets);
+        let looks = self.looks(simulate, data, &hunt.base, hunt.probe, sizes, &[0..sets, 0..sets]);
         looks.iter().map(|look| (look.square(), look.size)).collect()
     }
 

@@ -19,17 +19,62 @@ pub(super) struct Piece {
     /// Shares of the piece that are allowed.
     low: f64,
     high: f64,
-    pub(super) from: White,
-    pub(super) along: White,
+    from: White,
+    along: White,
+    /// Products of the two with themselves and with each other.
+    from_square: f64,
+    along_square: f64,
+    along_from: f64,
+}
+
+/// Pieces as the columns of two matrices: where they start, and where they lead.
+pub(super) struct Columns {
+    pub(super) from: DMatrix<f64>,
+    pub(super) along: DMatrix<f64>,
+}
+
+impl Columns {
+    pub(super) fn of(pieces: &[Piece]) -> Self {
+        let columns = |of: fn(&Piece) -> &White| {
+            DMatrix::from_columns(&pieces.iter().map(|piece| of(piece).clone()).collect::<Vec<_>>())
+        };
+        Self {
+            from: columns(|piece| &piece.from),
+            along: columns(|piece| &piece.along),
+        }
+    }
 }
 
 impl Piece {
+    /// A straight piece between two sizes, each with its action.
+    fn new(
+        probe: usize,
+        [from_size, to_size]: [f64; 2],
+        [low, high]: [f64; 2],
+        from: &White,
+        to: &White,
+    ) -> Self {
+        let along = to - from;
+        Self {
+            probe,
+            from_size,
+            to_size,
+            low,
+            high,
+            from_square: from.norm_squared(),
+            along_square: along.norm_squared(),
+            along_from: along.dot(from),
+            from: from.clone(),
+            along,
+        }
+    }
+
     /// The squared distance to a target that the piece's best point gains, and its size, by the target's products with the piece.
     pub(super) fn best(&self, along_target: f64, from_target: f64) -> (f64, f64) {
-        let square = self.along.norm_squared();
-        let product = along_target - self.along.dot(&self.from);
+        let square = self.along_square;
+        let product = along_target - self.along_from;
         let share = (product / square.max(f64::MIN_POSITIVE)).clamp(self.low, self.high);
-        let gain = 2.0 * from_target - self.from.norm_squared() + share * (2.0 * product - share * square);
+        let gain = 2.0 * from_target - self.from_square + share * (2.0 * product - share * square);
         (gain, self.at(share))
     }
 
@@ -57,8 +102,7 @@ impl Atlas {
     /// single explanation of two effects is often a third. Effects that jump are left out: their paths tell nothing.
     pub(super) fn screen_pairs(&self, residual: &White, most: usize) -> Vec<ScreenedPair> {
         let pieces = self.smooth_pieces();
-        let along = DMatrix::from_columns(&pieces.iter().map(|p| p.along.clone()).collect::<Vec<_>>());
-        let from = DMatrix::from_columns(&pieces.iter().map(|p| p.from.clone()).collect::<Vec<_>>());
+        let Columns { from, along } = Columns::of(&pieces);
         let products = Products {
             along_along: along.tr_mul(&along),
             along_from: along.tr_mul(&from),
@@ -133,7 +177,7 @@ impl Atlas {
     /// The paths of all probes that do not jump.
     pub(super) fn smooth_pieces(&self) -> Vec<Piece> {
         (0..self.probes.len())
-            .filter(|&probe| !self.probes[probe].jumps)
+            .filter(|&probe| !self.probes[probe].jumps())
             .flat_map(|probe| self.pieces(probe))
             .collect()
     }
@@ -141,14 +185,11 @@ impl Atlas {
     fn pieces(&self, probe: usize) -> Vec<Piece> {
         let nodes = self.nodes(probe);
         let last = nodes.len().saturating_sub(2);
-        let piece = |(i, pair): (usize, &[(f64, White)])| Piece {
-            probe,
-            from_size: pair[0].0,
-            to_size: pair[1].0,
-            low: if i == 0 { -BEYOND } else { 0.0 },
-            high: if i == last { 1.0 + BEYOND } else { 1.0 },
-            from: pair[0].1.clone(),
-            along: &pair[1].1 - &pair[0].1,
+        let piece = |(i, pair): (usize, &[(f64, White)])| {
+            let low = if i == 0 { -BEYOND } else { 0.0 };
+            let high = if i == last { 1.0 + BEYOND } else { 1.0 };
+            let sizes = [pair[0].0, pair[1].0];
+            Piece::new(probe, sizes, [low, high], &pair[0].1, &pair[1].1)
         };
         nodes.windows(2).enumerate().map(piece).collect()
     }
@@ -183,7 +224,7 @@ impl Search<'_> {
     /// Pairs that are looked for together, and explain nearly all of a strong signal where they are simulated, tried to the end.
     pub(super) fn clear_pairs(&self) -> Vec<Found> {
         const NEARLY_ALL: f64 = 0.95;
-        let all = 0.5 * (self.residual.norm_squared() - self.residual.len() as f64);
+        let all = 0.5 * self.excess(self.residual);
         if all < STRONG {
             return Vec::new();
         }
@@ -275,7 +316,7 @@ impl Search<'_> {
     /// Whether the best leaves so little of a strong signal that an effect that jumps does not stand for either of its own.
     fn explains_most(&self, tried: &Tried) -> bool {
         const LITTLE: f64 = 0.1;
-        let all = self.residual.norm_squared() - self.residual.len() as f64;
+        let all = self.excess(self.residual);
         let left = |best: &Descent| best.remainder.map(|left| left.excess());
         best_of(&tried.descents)
             .filter(|best| best.score > STRONG)
@@ -392,15 +433,8 @@ mod tests {
     #[test]
     fn the_best_point_of_a_piece_is_the_projection_within_its_bounds() {
         // From (1, 0) at size 2 straight up to (1, 4) at size 4, and half a piece beyond.
-        let piece = Piece {
-            probe: 0,
-            from_size: 2.0,
-            to_size: 4.0,
-            low: 0.0,
-            high: 1.5,
-            from: White::from_vec(vec![1.0, 0.0]),
-            along: White::from_vec(vec![0.0, 4.0]),
-        };
+        let [from, to] = [[1.0, 0.0], [1.0, 4.0]].map(|v| White::from_vec(v.to_vec()));
+        let piece = Piece::new(0, [2.0, 4.0], [0.0, 1.5], &from, &to);
         for (target, size, nearest) in [
             ([2.0, 3.0], 3.5, [1.0, 3.0]),
             ([0.0, 9.0], 5.0, [1.0, 6.0]),

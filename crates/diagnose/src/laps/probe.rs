@@ -22,9 +22,7 @@ pub(super) struct Probe {
     pub(super) odd: bool,
     /// The size comes in whole multiples of this.
     pub(super) quantum: Option<f64>,
-    /// Whether its action jumps with its size.
-    pub(super) jumps: bool,
-    /// Sizes in a constant ratio of which one is near enough to any other for what jumps to be about the same.
+    /// Sizes to scan, in a constant ratio, where its action jumps with its size; 0 where it does not.
     pub(super) scanned: u32,
     /// Whether its size is a limit, which does the more the smaller it is and nothing where it is large.
     limit: bool,
@@ -53,7 +51,6 @@ impl Probe {
             free,
             odd: false,
             quantum: None,
-            jumps: false,
             scanned: 0,
             limit: false,
             sets: PROBE_SETS,
@@ -71,6 +68,11 @@ impl Probe {
     /// Whether the effect itself is a change in time.
     pub(super) fn drifts(&self) -> bool {
         self.spec.drifts()
+    }
+
+    /// Whether its action jumps with its size.
+    pub(super) fn jumps(&self) -> bool {
+        self.scanned > 0
     }
 
     /// Which parameter sizes it.
@@ -198,7 +200,6 @@ fn probe(name: &str, fixed: &[(&str, f64)], sizes: &[f64], free: &[(&str, f64)])
         free,
         odd: false,
         quantum: None,
-        jumps: jumping.is_some(),
         scanned: jumping.map_or(0, |jumping| jumping.1),
         limit,
         sets: PROBE_SETS,

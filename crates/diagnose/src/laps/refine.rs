@@ -382,7 +382,7 @@ impl Atlas {
     fn least_left(&self, hypothesis: &Hypothesis) -> f64 {
         const DEVIATIONS: f64 = 4.0;
         let count = self.layout.len() as f64;
-        let jumps = (hypothesis.parts.iter()).any(|part| self.probes[part.probe].jumps);
+        let jumps = (hypothesis.parts.iter()).any(|part| self.probes[part.probe].jumps());
         count
             - if jumps {
                 0.0

@@ -8,7 +8,7 @@ use super::beside::Base;
 use super::expectation::Expectation;
 use super::hunt::{Hunt, Look};
 use super::hypothesis::{Hypothesis, Part, Shape};
-use super::pairs::Piece;
+use super::pairs::{Columns, Piece};
 use super::refine::Descent;
 use super::search::{BASES, Found, ROUNDS_OF_SEVERAL, Search, near};
 
@@ -100,11 +100,8 @@ impl Atlas {
     /// The constant probes that do not jump which explain a residual best beside every scanned one, best first: of a probe that
     /// jumps few at a size and about it.
     fn screen_beside_scans(&self, residual: &White, scans: &[Scan], most: usize) -> Vec<Beside> {
-        let pieces: Vec<Piece> = self.smooth_pieces();
-        let columns = |of: fn(&Piece) -> &White| {
-            DMatrix::from_columns(&pieces.iter().map(|piece| of(piece).clone()).collect::<Vec<_>>())
-        };
-        let (along, from) = (columns(|piece| &piece.along), columns(|piece| &piece.from));
+        let pieces = self.smooth_pieces();
+        let Columns { from, along } = Columns::of(&pieces);
         let mut all: Vec<Beside> = Vec::new();
         for scan in scans.iter().filter(|scan| !scan.looks.is_empty()) {
             let left: Vec<White> = scan.looks.iter().map(Look::mean).collect();
@@ -260,6 +257,6 @@ impl Search<'_> {
     }
 
     fn jumping(&self) -> impl Iterator<Item = usize> {
-        (0..self.atlas.probes.len()).filter(|&probe| self.atlas.probes[probe].jumps)
+        (0..self.atlas.probes.len()).filter(|&probe| self.atlas.probes[probe].jumps())
     }
 }

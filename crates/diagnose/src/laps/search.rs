@@ -173,7 +173,7 @@ impl Search<'_> {
     /// Whether a hypothesis has an effect whose action jumps with its size.
     pub(super) fn jumps(&self, hypothesis: &Hypothesis) -> bool {
         let mut parts = hypothesis.parts.iter();
-        parts.any(|part| self.atlas.probes[part.probe].jumps)
+        parts.any(|part| self.atlas.probes[part.probe].jumps())
     }
 
     /// Whether an explanation has an effect that jumps at a size to which a descent led.
@@ -414,7 +414,7 @@ impl Search<'_> {
             let bar = best.max(reached);
             let may_be_chance = |d: &Descent| ERRORS * error.hypot(d.score_error);
             alive.retain(|d| d.within_reach() >= bar - behind.max(share * bar).max(may_be_chance(d)));
-            alive = self.without_repeats(alive);
+            alive = self.without_repeats(alive, |descent| &descent.hypothesis);
             if fits {
                 let others = alive.split_off(FEW.min(alive.len()));
                 alive.extend(others.into_iter().filter(|other| may_catch_up(other, best)));
@@ -454,13 +454,13 @@ impl Search<'_> {
         (self.watch)(&what.to_string());
     }
 
-    /// Descents, best first, without those that came to where a better one is.
-    fn without_repeats(&self, sorted: Vec<Descent>) -> Vec<Descent> {
-        let mut kept: Vec<Descent> = Vec::new();
-        for descent in sorted {
-            let repeats = |better: &Descent| descent.hypothesis.is_near(&better.hypothesis, self.atlas);
+    /// Descents or explanations, best first, without those that came to where a better one is.
+    fn without_repeats<T>(&self, sorted: Vec<T>, hypothesis: fn(&T) -> &Hypothesis) -> Vec<T> {
+        let mut kept: Vec<T> = Vec::new();
+        for one in sorted {
+            let repeats = |better: &T| hypothesis(&one).is_near(hypothesis(better), self.atlas);
             if !kept.iter().any(repeats) {
-                kept.push(descent);
+                kept.push(one);
             }
         }
         kept
@@ -475,14 +475,7 @@ impl Search<'_> {
             .map(|settled| self.found(settled))
             .collect();
         sort(&mut found);
-        let mut kept: Vec<Found> = Vec::new();
-        for found in found {
-            let repeats = |better: &Found| found.hypothesis.is_near(&better.hypothesis, self.atlas);
-            if !kept.iter().any(repeats) {
-                kept.push(found);
-            }
-        }
-        kept
+        self.without_repeats(found, |found| &found.hypothesis)
     }
 
     /// Descents with better sizes of the effects that jump, which were found beside others that have moved since: those of
@@ -490,6 +483,7 @@ impl Search<'_> {
     fn hunted_again(&self, mut descents: Vec<Descent>) -> Vec<Descent> {
         /// How far the other effects have moved from one time to the next.
         const MOVED: [Moved; 3] = [Moved::Far, Moved::Little, Moved::Little];
+        /// Share of the best score by which a descent may lie behind it and still be looked at.
         const SHARE: f64 = 0.03;
         let held = |part: &Part| part.held.is_some();
         for moved in MOVED {
@@ -575,10 +569,14 @@ impl Search<'_> {
         others
     }
 
+    /// What is left of the data in squared distance beyond what chance leaves.
+    pub(super) fn excess(&self, left: &White) -> f64 {
+        left.norm_squared() - self.atlas.layout.len() as f64
+    }
+
     pub(super) fn found(&self, settled: &Settled) -> Found {
         let Settled { refined, evaluated } = settled;
         let atlas = self.atlas;
-        let excess = |squares: f64| squares - self.residual.len() as f64;
         let remainder = FourNumbers::new(&refined.fit.residual, &atlas.layout);
         Found {
             gain_error: refined.fit.gain_error,
@@ -590,8 +588,7 @@ impl Search<'_> {
                 effects: candidates(atlas, &refined.hypothesis, &refined.errors, refined.fit.gain),
                 score: refined.score,
                 gain: refined.fit.gain,
-                share: 1.0
-                    - excess(refined.fit.residual.norm_squared()) / excess(self.residual.norm_squared()),
+                share: 1.0 - self.excess(&refined.fit.residual) / self.excess(self.residual),
                 remainder_p: Some(remainder.omnibus_p()),
                 remainder: Some(remainder),
             },

@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector};
+use statrs::statistics::{Data, OrderStatistics};
 
 use super::layout::ramp_norm;
 use super::observed::ObservedLap;
@@ -88,11 +89,12 @@ impl Recording {
         if runs.is_empty() || runs.iter().any(|laps| laps.len() < 3) {
             return None;
         }
-        let (near, noise) = (lap_vectors(runs), of_each(runs, noise_vector));
-        let finite = (near.iter().chain(&noise).flatten()).all(|lap| lap.iter().all(|x| x.is_finite()));
+        let (vectors, noise) = (of_each(runs, lap_vector), of_each(runs, noise_vector));
+        let finite = (vectors.iter().chain(&noise).flatten()).all(|lap| lap.iter().all(|x| x.is_finite()));
         if !finite {
             return None;
         }
+        let near = brought_near(vectors);
         let size = near[0][0].len();
         let mut scatter = DMatrix::zeros(size, size);
         let mut freedom = 0;
@@ -119,7 +121,7 @@ impl Recording {
 
 /// The laps of the runs of one recording as vectors, those that went far astray brought nearer.
 pub(super) fn lap_vectors(runs: &[Vec<ObservedLap>]) -> Vec<Vec<DVector<f64>>> {
-    brought_near(&of_each(runs, lap_vector))
+    brought_near(of_each(runs, lap_vector))
 }
 
 fn of_each(runs: &[Vec<ObservedLap>], vector: fn(&ObservedLap) -> DVector<f64>) -> Vec<Vec<DVector<f64>>> {
@@ -129,7 +131,7 @@ fn of_each(runs: &[Vec<ObservedLap>], vector: fn(&ObservedLap) -> DVector<f64>) 
 
 /// Laps of which those that went far astray are brought nearer to the middle of their run, as a whole: one of them would decide
 /// a mean. How far is far is told by how all the others scatter.
-fn brought_near(runs: &[Vec<DVector<f64>>]) -> Vec<Vec<DVector<f64>>> {
+fn brought_near(mut runs: Vec<Vec<DVector<f64>>>) -> Vec<Vec<DVector<f64>>> {
     /// Deviations, all along one of the stretches.
     const FAR: f64 = 5.0;
     let size = runs[0][0].len();
@@ -143,8 +145,7 @@ fn brought_near(runs: &[Vec<DVector<f64>>]) -> Vec<Vec<DVector<f64>>> {
     let variances = DVector::from_fn(size, |i, _| {
         trimmed_mean(squares.iter().flatten().map(|square| square[i]).collect())
     });
-    let mut near = runs.to_vec();
-    for ((laps, squares), middle) in near.iter_mut().zip(&squares).zip(&middles) {
+    for ((laps, squares), middle) in runs.iter_mut().zip(&squares).zip(&middles) {
         for (lap, square) in laps.iter_mut().zip(squares) {
             let deviations = square.component_div(&variances);
             let most = stretches(size)
@@ -155,12 +156,12 @@ fn brought_near(runs: &[Vec<DVector<f64>>]) -> Vec<Vec<DVector<f64>>> {
             }
         }
     }
-    near
+    runs
 }
 
 /// Medians of the entries of some laps.
 fn middle(laps: &[DVector<f64>]) -> DVector<f64> {
-    let median_of = |i: usize, _| median(&mut laps.iter().map(|lap| lap[i]).collect::<Vec<f64>>());
+    let median_of = |i: usize, _| Data::new(laps.iter().map(|lap| lap[i]).collect::<Vec<f64>>()).median();
     DVector::from_fn(laps[0].len(), median_of)
 }
 
@@ -171,17 +172,6 @@ fn trimmed_mean(mut values: Vec<f64>) -> f64 {
         values.select_nth_unstable_by(kept, f64::total_cmp);
     }
     values[..kept].iter().sum::<f64>() / kept as f64
-}
-
-/// The middle one of some values, of an even number the mean of the middle two.
-fn median(values: &mut [f64]) -> f64 {
-    let (half, odd) = (values.len() / 2, values.len() % 2 == 1);
-    let (below, &mut upper, _) = values.select_nth_unstable_by(half, f64::total_cmp);
-    if odd {
-        return upper;
-    }
-    let lower = below.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    0.5 * (lower + upper)
 }
 
 /// Positions of n laps in their run, centred and of unit norm.
@@ -325,11 +315,11 @@ mod tests {
     #[test]
     fn a_lap_far_astray_hardly_moves_the_mean_and_no_other_lap_moves() {
         let usual = vec![usual_run(1), usual_run(2)];
-        assert_eq!(brought_near(&usual), usual);
+        assert_eq!(brought_near(usual.clone()), usual);
         let mut astray = usual.clone();
         // Eighty times as far as the others scatter (by 0.58) in ten gates.
         astray[1][7].rows_mut(40, 10).add_scalar_mut(46.0);
-        let near = brought_near(&astray);
+        let near = brought_near(astray);
         let most = near[1][7].rows(40, 10).map(|x| (x - 3.0).abs()).max();
         assert!((2.0..4.0).contains(&most), "{most}");
         for (run, laps) in near.iter().enumerate() {
@@ -341,8 +331,12 @@ mod tests {
 
     #[test]
     fn medians_and_trimmed_means() {
-        assert_eq!(median(&mut [3.0, 1.0, 2.0]), 2.0);
-        assert_eq!(median(&mut [4.0, 1.0, 2.0, 3.0]), 2.5);
+        let median = |values: &[f64]| {
+            let laps: Vec<DVector<f64>> = values.iter().map(|&x| DVector::from_element(1, x)).collect();
+            middle(&laps)[0]
+        };
+        assert_eq!(median(&[3.0, 1.0, 2.0]), 2.0);
+        assert_eq!(median(&[4.0, 1.0, 2.0, 3.0]), 2.5);
         let mut values: Vec<f64> = (0..79).map(|_| 2.0).collect();
         values.extend([90.0]);
         assert_eq!(trimmed_mean(values), 2.0);
