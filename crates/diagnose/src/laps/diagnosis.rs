@@ -118,6 +118,7 @@ impl Atlas {
             watch,
             scanned: OnceLock::new(),
             together: OnceLock::new(),
+            descended_together: OnceLock::new(),
         };
         let ripple = search.ripple(&Hypothesis { parts: Vec::new() });
         let alarm = numbers.omnibus_p() < ALARM_P || self.best_score(&residual) > ALARM_SCORE;
@@ -234,7 +235,7 @@ fn explain(search: &Search<'_>, mut found: Vec<Found>) -> Vec<Found> {
             let (stands, faults) = (stands_alone(&best.explanation), faults_beside(&best.explanation));
             search.pairs_with(best, stands, faults)
         }
-        _ => search.pairs(&found),
+        _ => search.pairs(&mut found),
     };
     found = preferred(found, pairs);
     if first_is(&found, |best| best.effects.len() > 1 && !suffices(best)) {

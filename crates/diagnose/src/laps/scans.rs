@@ -24,8 +24,8 @@ pub(super) struct Scan {
 }
 
 /// A probe beside one that jumps, at the sizes that together leave least of the data.
-struct Beside {
-    score: f64,
+pub(super) struct Beside {
+    pub(super) score: f64,
     other: usize,
     other_size: f64,
     jumping: usize,
@@ -186,11 +186,15 @@ impl Search<'_> {
         })
     }
 
-    /// Pairs of an effect that jumps and one that does not, the most promising first, with the squared distance that they leave as far
-    /// as the other's size follows. What both do is taken to add up where they are looked for: no single effect need come near.
-    pub(super) fn hunts_of_pairs(&self) -> Vec<(f64, Hunt)> {
+    /// The most promising pairs of an effect that jumps and one that does not. What both do is taken to add up: no single effect need
+    /// come near.
+    pub(super) fn screened_pairs_that_jump(&self) -> Vec<Beside> {
         const HEARD: usize = 8;
-        let beside = (self.atlas).screen_beside_scans(self.residual, self.scanned(), HEARD);
+        (self.atlas).screen_beside_scans(self.residual, self.scanned(), HEARD)
+    }
+
+    /// Such pairs, those that come nearest first, with the squared distance that they leave as far as the other's size follows.
+    pub(super) fn hunts_of_pairs(&self, screened: &[Beside]) -> Vec<(f64, Hunt)> {
         self.tell(format_args!("which sizes that jump go with another effect"));
         let look = |beside: &Beside| {
             let other = Part::screened(self.atlas, beside.other, Shape::Constant, &[beside.other_size]);
@@ -198,7 +202,7 @@ impl Search<'_> {
             let hunt = Hunt::new(base, beside.jumping, beside.size, beside.spacing);
             self.atlas.hunted_once(self.simulate, self.data, hunt)
         };
-        let mut hunts: Vec<(f64, Hunt)> = beside.par_iter().filter_map(look).collect();
+        let mut hunts: Vec<(f64, Hunt)> = screened.par_iter().filter_map(look).collect();
         hunts.sort_by(|a, b| a.0.total_cmp(&b.0));
         hunts
     }
