@@ -136,7 +136,13 @@ impl Atlas {
         Some(self.paired(summaries, 0, evaluated.doubt.alike))
     }
 
-    fn simulated(&self, simulate: &Simulate<'_>, settings: &[Setting], sets: u64) -> Option<Evaluated> {
+    /// Settings simulated with so many data sets; `None` where the robot crashes.
+    pub(super) fn simulated(
+        &self,
+        simulate: &Simulate<'_>,
+        settings: &[Setting],
+        sets: u64,
+    ) -> Option<Evaluated> {
         let summaries = self.summaries(simulate, settings, 0..sets)?;
         Some(self.paired(summaries, 0, self.are_alike(settings)))
     }
@@ -175,17 +181,19 @@ impl Atlas {
         let sets = summaries.len();
         let mean = Expectation::of(summaries.iter(), alike);
         let declared_mean = Expectation::mean(declared, alike);
-        let (mut both, mut own) = (0.0, 0.0);
+        let (mut both, mut own, mut of_declared) = (0.0, 0.0, 0.0);
         for (summary, &sample) in summaries.iter().zip(declared) {
             let sample = self.white(sample, &declared_mean);
-            both += self
-                .white(&Expectation::of(std::iter::once(summary), false), &mean)
-                .dot(&sample);
-            own += sample.norm_squared();
+            let found = self.white(&Expectation::of(std::iter::once(summary), false), &mean);
+            both += found.dot(&sample);
+            own += found.norm_squared();
+            of_declared += sample.norm_squared();
         }
-        let share = (both / own).clamp(0.0, 1.0);
+        let share = (both / of_declared).max(0.0);
+        // The square of their correlation: how much of what draws do the declared model tells.
+        let told = share * both / own;
         let expectation = mean.moved(share, &declared_mean, &self.null);
-        let error = (1.0 - share * share) / sets as f64 + share * share / self.samples.len() as f64;
+        let error = (1.0 - told) / sets as f64 + told / self.samples.len() as f64;
         Evaluated {
             expectation,
             doubt: Doubt { error, alike },
