@@ -11,7 +11,7 @@ use super::memo::Memo;
 use super::observed::ObservedLap;
 use super::ripple::Ripple;
 use super::screen::Screened;
-use super::search::{Found, STRONG, Search, candidates, sort};
+use super::search::{Found, STRONG, Search, candidates, of_other_effects, sort};
 use super::tests_of_fit::{FourNumbers, SIGNIFICANT_P};
 use crate::answer::{ALTERNATIVE, indistinguishable};
 use crate::{Answer, Cause, Error, Explanation, Verdict, Watch};
@@ -41,8 +41,9 @@ const WORTH_BESIDE: f64 = 15.0;
 /// exact.
 const FAULTS: f64 = 0.001;
 
-/// Single effects of which the sizes are let go over the runs or in time.
+/// Single effects of which the sizes are let go over the runs or in time, and several together.
 const PATTERNS_OF: usize = 3;
+const PATTERNS_OF_SEVERAL: usize = 2;
 
 /// Whether what an explanation leaves is as likely as that by chance.
 fn leaves_more_likely_than(explanation: &Explanation, p: f64) -> bool {
@@ -227,7 +228,7 @@ fn explain(search: &Search<'_>, mut found: Vec<Found>) -> Vec<Found> {
         found.extend(scans);
         sort(&mut found);
     }
-    found.extend(search.patterns(&found[..found.len().min(PATTERNS_OF)]));
+    found.extend(search.patterns(found.iter().take(PATTERNS_OF)));
     sort(&mut found);
     let leaves_next_to_nothing = |best: &Explanation| best.share >= ENOUGH && !goes_over_runs_or_time(best);
     let pairs = match found.first() {
@@ -239,7 +240,8 @@ fn explain(search: &Search<'_>, mut found: Vec<Found>) -> Vec<Found> {
     };
     found = preferred(found, pairs);
     if first_is(&found, |best| best.effects.len() > 1 && !suffices(best)) {
-        let patterns = search.patterns(&found[..1]);
+        let several = (found.iter()).filter(|found| found.explanation.effects.len() > 1);
+        let patterns = search.patterns(of_other_effects(several).into_iter().take(PATTERNS_OF_SEVERAL));
         found = preferred(found, patterns);
     }
     if !first_is(&found, |best| suffices(best) || best.share > MOST) {

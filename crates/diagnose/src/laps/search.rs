@@ -193,7 +193,7 @@ impl Search<'_> {
 
     /// The best explanations with a size that goes over the runs or in time, where what they leave does, all in all or along
     /// what a single effect does, tried to the end.
-    pub(super) fn patterns(&self, best: &[Found]) -> Vec<Found> {
+    pub(super) fn patterns<'f>(&self, best: impl Iterator<Item = &'f Found>) -> Vec<Found> {
         let mut starts: Vec<Hypothesis> = Vec::new();
         for found in best {
             let Some(left) = found.explanation.remainder else {
