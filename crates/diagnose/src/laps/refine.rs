@@ -31,7 +31,7 @@ impl Round {
     fn sets_around(self, points: u64) -> u64 {
         match self {
             Self::Rough | Self::Again => (16 / points).clamp(3, 4),
-            Self::Full => (32 / points).clamp(4, 8),
+            Self::Full => (45 / points).clamp(6, 10),
         }
     }
 
