@@ -211,9 +211,12 @@ fn explain(search: &Search<'_>, mut found: Vec<Found>) -> Vec<Found> {
     }
     // Of an effect that jumps a descent finds the nearest good size, not the best.
     let jumps = found.first().is_some_and(|best| search.jumped(best));
-    if !first_is(&found, |best| {
-        leaves_nothing_to_ask(best) || best.share > MOST && !jumps && !goes_over_runs_or_time(best)
-    }) {
+    let needs_no_scan = |best: &Explanation| {
+        // What explains most and leaves something lacks a second effect rather than another name.
+        let lacks_another = best.share > MOST && !jumps && !goes_over_runs_or_time(best);
+        suffices(best) && !is_doubtful(best, ENOUGH) || lacks_another && !fits(best)
+    };
+    if !first_is(&found, needs_no_scan) {
         let clear = search.clear_pairs();
         if first_is(&clear, leaves_nothing_to_ask) {
             found = preferred(found, clear);
