@@ -224,12 +224,7 @@ fn explain(search: &Search<'_>, mut found: Vec<Found>) -> Vec<Found> {
                 return held_still(search, found);
             }
         }
-        let scans = search.scans();
-        if !scans.is_empty() {
-            found.retain(|found| !search.jumped(found));
-        }
-        found.extend(scans);
-        sort(&mut found);
+        search.scan(&mut found);
     }
     found.extend(search.patterns(found.iter().take(PATTERNS_OF)));
     sort(&mut found);

@@ -9,7 +9,7 @@ use super::hypothesis::{Hypothesis, Part, Shape};
 use super::refine::Descent;
 use super::screen::{BEYOND, price, tangent};
 use super::search::{
-    BASES, Found, ROUNDS_BESIDE, ROUNDS_OF_SEVERAL, Rounds, STRONG, Search, best_of, of_other_effects, sort,
+    BASES, Found, ROUNDS_BESIDE, ROUNDS_OF_SEVERAL, Rounds, STRONG, Search, best_of, of_other_effects,
 };
 
 /// A straight piece of a probe's path.
@@ -245,8 +245,8 @@ impl Search<'_> {
     pub(super) fn pairs(&self, singles: &mut Vec<Found>) -> Vec<Found> {
         let mut tried = Tried::new(&ROUNDS_OF_SEVERAL, f64::NEG_INFINITY);
         let mut hunts = self.promising_hunts();
-        let nearest = hunts.first().map_or(f64::INFINITY, |first| first.0);
-        let jumps_first = self.together().first().is_none_or(|best| nearest < best.left);
+        let beats_others = |left: f64| self.together().first().is_none_or(|best| left < best.left);
+        let jumps_first = hunts.first().is_some_and(|(left, _)| beats_others(*left));
         if jumps_first {
             self.descend_on(&mut tried, self.pairs_that_jump(&hunts));
         }
@@ -265,8 +265,7 @@ impl Search<'_> {
         }
         if !tried.fits() && !jumps_first && !self.explains_most(&tried) {
             if !self.was_scanned() {
-                singles.extend(self.scans());
-                sort(singles);
+                self.scan(singles);
                 if singles.first().is_some_and(Found::fits) {
                     return self.settle(tried.descents);
                 }

@@ -10,7 +10,7 @@ use super::hunt::{Hunt, Look};
 use super::hypothesis::{Hypothesis, Part, Shape};
 use super::pairs::{Columns, Piece};
 use super::refine::Descent;
-use super::search::{BASES, Found, ROUNDS_OF_SEVERAL, Search, near};
+use super::search::{BASES, Found, ROUNDS_OF_SEVERAL, Search, near, sort};
 
 /// What a probe that jumps leaves of the data beside a base at sizes all over its range.
 #[derive(Debug, Clone)]
@@ -151,8 +151,18 @@ impl Atlas {
 }
 
 impl Search<'_> {
-    /// Effects whose action jumps with their size, at the best of many sizes.
-    pub(super) fn scans(&self) -> Vec<Found> {
+    /// Adds effects whose action jumps with their size, at the best of many sizes, to single effects: they replace those at which
+    /// descents ended.
+    pub(super) fn scan(&self, singles: &mut Vec<Found>) {
+        let scans = self.scans();
+        if !scans.is_empty() {
+            singles.retain(|found| !self.jumped(found));
+        }
+        singles.extend(scans);
+        sort(singles);
+    }
+
+    fn scans(&self) -> Vec<Found> {
         let nothing = self.atlas.at_rest(Hypothesis { parts: Vec::new() });
         let closer = |scan: &Scan| {
             self.tell(format_args!(

@@ -22,6 +22,25 @@ pub(super) struct Evaluated {
     pub(super) summaries: Vec<Summary>,
 }
 
+/// What draws do to a hypothesis, as far as what they do to the declared model tells it.
+struct Control {
+    /// Of the one, in units of the other.
+    share: f64,
+    /// The square of their correlation.
+    told: f64,
+}
+
+impl Control {
+    /// By the sums of the products of deviations from the means, and of the squares of either.
+    fn new(both: f64, own: f64, of_declared: f64) -> Self {
+        let share = (both / of_declared.max(f64::MIN_POSITIVE)).max(0.0);
+        Self {
+            share,
+            told: share * both / own.max(f64::MIN_POSITIVE),
+        }
+    }
+}
+
 impl Atlas {
     /// Data sets at each of so many points that determine the scatter of a lap too: short runs need more of them.
     pub(super) fn enough(&self, sets: u64, points: u64) -> u64 {
@@ -72,7 +91,8 @@ impl Atlas {
     ) -> Option<Expectation> {
         let alike = self.are_alike(settings);
         // How runs differ that should be alike tells what draws do, or else how data sets do.
-        let fewest = if alike { 1 } else { 2 };
+        let runs_tell = alike && self.layout.laps.iter().any(|laps| laps.len() > 1);
+        let fewest = if runs_tell { 1 } else { 2 };
         let all = sets.end - sets.start;
         if all < fewest {
             return self.simulated_plainly(simulate, settings, sets);
@@ -189,15 +209,39 @@ impl Atlas {
             own += found.norm_squared();
             of_declared += sample.norm_squared();
         }
-        let share = (both / of_declared).max(0.0);
-        // The square of their correlation: how much of what draws do the declared model tells.
-        let told = share * both / own;
+        let Control { share, told } = Control::new(both, own, of_declared);
         let expectation = mean.moved(share, &declared_mean, &self.null);
         let error = (1.0 - told) / sets as f64 + told / self.samples.len() as f64;
         Evaluated {
             expectation,
             doubt: Doubt { error, alike },
             summaries,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Control;
+
+    #[test]
+    fn draws_that_do_twice_as_much_are_told_altogether() {
+        let control = Control::new(2.0 * 5.0, 4.0 * 5.0, 5.0);
+        assert_eq!((control.share, control.told), (2.0, 1.0));
+    }
+
+    #[test]
+    fn draws_of_a_noisier_robot_are_told_in_part() {
+        // Own deviations are the declared model's and others of three times their square.
+        let control = Control::new(5.0, 4.0 * 5.0, 5.0);
+        assert_eq!((control.share, control.told), (1.0, 0.25));
+    }
+
+    #[test]
+    fn without_deviations_nothing_is_told() {
+        for (both, own, of_declared) in [(0.0, 0.0, 0.0), (-1.0, 2.0, 2.0)] {
+            let control = Control::new(both, own, of_declared);
+            assert_eq!((control.share, control.told), (0.0, 0.0));
         }
     }
 }
