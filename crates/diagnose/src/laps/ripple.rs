@@ -7,6 +7,7 @@ use std::f64::consts::TAU;
 
 use nalgebra::DVector;
 use rayon::prelude::*;
+use statrs::statistics::{Data, OrderStatistics};
 
 use super::atlas::{Atlas, Simulate};
 use super::hypothesis::{Hypothesis, Part};
@@ -161,13 +162,11 @@ fn lines(spectrum: &DVector<f64>) -> DVector<f64> {
     let values = spectrum.as_slice();
     let above = |at: usize| {
         let about = at.saturating_sub(GROUND)..(at + GROUND + 1).min(values.len());
-        let mut others: Vec<f64> = about.filter(|&k| k != at).map(|k| values[k]).collect();
-        others.sort_by(f64::total_cmp);
-        let (low, high) = match others.len() {
-            0 => return 0.0,
-            n => (others[(n - 1) / 2], others[n / 2]),
-        };
-        values[at] - 0.5 * (low + high)
+        let others: Vec<f64> = about.filter(|&k| k != at).map(|k| values[k]).collect();
+        if others.is_empty() {
+            return 0.0;
+        }
+        values[at] - Data::new(others).median()
     };
     DVector::from_iterator(values.len(), (0..values.len()).map(above))
 }

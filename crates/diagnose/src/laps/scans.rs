@@ -251,11 +251,6 @@ impl Search<'_> {
         self.settle(self.descend_several(&starts, &ROUNDS_OF_SEVERAL, near(found)))
     }
 
-    /// The squared distance that chance leaves.
-    fn chance(&self) -> f64 {
-        self.atlas.layout.len() as f64
-    }
-
     fn jumping(&self) -> impl Iterator<Item = usize> {
         (0..self.atlas.probes.len()).filter(|&probe| self.atlas.probes[probe].jumps())
     }

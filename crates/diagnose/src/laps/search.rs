@@ -571,7 +571,12 @@ impl Search<'_> {
 
     /// What is left of the data in squared distance beyond what chance leaves.
     pub(super) fn excess(&self, left: &White) -> f64 {
-        left.norm_squared() - self.atlas.layout.len() as f64
+        left.norm_squared() - self.chance()
+    }
+
+    /// The squared distance that chance leaves.
+    pub(super) fn chance(&self) -> f64 {
+        self.atlas.layout.len() as f64
     }
 
     pub(super) fn found(&self, settled: &Settled) -> Found {
