@@ -23,6 +23,9 @@ pub type Simulate<'a> = dyn Fn(&[Setting], u64) -> Option<Vec<Vec<ObservedLap>>>
 /// Data sets simulated with the declared model.
 pub(super) const NULL_SETS: u64 = 200;
 
+/// Data sets simulated for each size of a probe.
+const PATH_SETS: u64 = 3;
+
 /// Data sets simulated for each other way to cut the walls.
 const CUT_SETS: u64 = 8;
 
@@ -71,7 +74,7 @@ impl Clone for Spent {
 impl Atlas {
     /// Changes whenever the numbers of an atlas of the same model mean something else: atlases of another recipe are not to be
     /// read.
-    pub const RECIPE: u32 = 4;
+    pub const RECIPE: u32 = 5;
 
     /// Simulates everything for one recording; `cuts` simulate the declared model with walls that another program may have
     /// cut, which is no departure from it; `alike` says whether the declared model does the same in every run. `tick` is called
@@ -145,7 +148,7 @@ impl Atlas {
         Ok(atlas)
     }
 
-    /// The action of every probe at every size, by the same draws with and without it.
+    /// The action of every probe at every size.
     fn simulate_paths(&self, simulate: &Simulate<'_>, tick: &(dyn Fn() + Sync)) -> Vec<Vec<Option<White>>> {
         let jobs: Vec<(usize, usize)> = (self.probes.iter().enumerate())
             .flat_map(|(p, probe)| (0..probe.sizes.len()).map(move |k| (p, k)))
@@ -155,14 +158,12 @@ impl Atlas {
             .map(|&(p, k)| {
                 let probe = &self.probes[p];
                 let setting = [probe.setting(probe.sizes[k])];
-                let same_draws = self.declared_mean(0..probe.sets);
-                let sets: Option<Vec<Summary>> = (0..probe.sets)
-                    .map(|set| {
-                        tick();
-                        self.summary(simulate, &setting, set)
-                    })
-                    .collect();
-                sets.map(|sets| self.white(&Expectation::of(sets.iter(), self.alike), &same_draws))
+                let ticking = |effects: &[Setting], set: u64| {
+                    tick();
+                    simulate(effects, set)
+                };
+                let found = self.simulated(&ticking, &setting, PATH_SETS)?;
+                Some(self.white(&found.expectation, &self.null))
             })
             .collect();
         let mut points = points.into_iter();
@@ -238,7 +239,7 @@ impl Atlas {
 
     /// Number of data sets that [`Atlas::new`] simulates with so many other cuts.
     pub fn sets(cuts: usize) -> u64 {
-        let sets = |probe: &Probe| probe.sets * probe.sizes.len() as u64;
+        let sets = |probe: &Probe| PATH_SETS * probe.sizes.len() as u64;
         Self::null_sets(cuts) + probes().iter().map(sets).sum::<u64>()
     }
 

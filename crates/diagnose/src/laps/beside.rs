@@ -127,7 +127,7 @@ impl Atlas {
     ) -> Option<White> {
         let mut settings = base.hypothesis.settings(self);
         settings.extend_from_slice(further);
-        let found = self.simulated_plainly(simulate, &settings, sets)?;
+        let found = self.simulated_briefly(simulate, &settings, sets)?;
         Some(self.left_beyond(data, base, &found))
     }
 }

@@ -11,7 +11,7 @@ use super::memo::Memo;
 use super::observed::ObservedLap;
 use super::ripple::Ripple;
 use super::screen::Screened;
-use super::search::{Found, STRONG, Search, candidates, sort};
+use super::search::{Found, STRONG, Search, candidates, of_other_effects, sort};
 use super::tests_of_fit::{FourNumbers, SIGNIFICANT_P};
 use crate::answer::{ALTERNATIVE, indistinguishable};
 use crate::{Answer, Cause, Error, Explanation, Verdict, Watch};
@@ -41,8 +41,9 @@ const WORTH_BESIDE: f64 = 15.0;
 /// exact.
 const FAULTS: f64 = 0.001;
 
-/// Single effects of which the sizes are let go over the runs or in time.
+/// Single effects of which the sizes are let go over the runs or in time, and several together.
 const PATTERNS_OF: usize = 3;
+const PATTERNS_OF_SEVERAL: usize = 2;
 
 /// Whether what an explanation leaves is as likely as that by chance.
 fn leaves_more_likely_than(explanation: &Explanation, p: f64) -> bool {
@@ -118,6 +119,7 @@ impl Atlas {
             watch,
             scanned: OnceLock::new(),
             together: OnceLock::new(),
+            descended_together: OnceLock::new(),
         };
         let ripple = search.ripple(&Hypothesis { parts: Vec::new() });
         let alarm = numbers.omnibus_p() < ALARM_P || self.best_score(&residual) > ALARM_SCORE;
@@ -209,9 +211,12 @@ fn explain(search: &Search<'_>, mut found: Vec<Found>) -> Vec<Found> {
     }
     // Of an effect that jumps a descent finds the nearest good size, not the best.
     let jumps = found.first().is_some_and(|best| search.jumped(best));
-    if !first_is(&found, |best| {
-        leaves_nothing_to_ask(best) || best.share > MOST && !jumps && !goes_over_runs_or_time(best)
-    }) {
+    let needs_no_scan = |best: &Explanation| {
+        // What explains most and leaves something lacks a second effect rather than another name.
+        let lacks_another = best.share > MOST && !jumps && !goes_over_runs_or_time(best);
+        suffices(best) && !is_doubtful(best, ENOUGH) || lacks_another && !fits(best)
+    };
+    if !first_is(&found, needs_no_scan) {
         let clear = search.clear_pairs();
         if first_is(&clear, leaves_nothing_to_ask) {
             found = preferred(found, clear);
@@ -219,14 +224,9 @@ fn explain(search: &Search<'_>, mut found: Vec<Found>) -> Vec<Found> {
                 return held_still(search, found);
             }
         }
-        let scans = search.scans();
-        if !scans.is_empty() {
-            found.retain(|found| !search.jumped(found));
-        }
-        found.extend(scans);
-        sort(&mut found);
+        search.scan(&mut found);
     }
-    found.extend(search.patterns(&found[..found.len().min(PATTERNS_OF)]));
+    found.extend(search.patterns(found.iter().take(PATTERNS_OF)));
     sort(&mut found);
     let leaves_next_to_nothing = |best: &Explanation| best.share >= ENOUGH && !goes_over_runs_or_time(best);
     let pairs = match found.first() {
@@ -234,11 +234,12 @@ fn explain(search: &Search<'_>, mut found: Vec<Found>) -> Vec<Found> {
             let (stands, faults) = (stands_alone(&best.explanation), faults_beside(&best.explanation));
             search.pairs_with(best, stands, faults)
         }
-        _ => search.pairs(&found),
+        _ => search.pairs(&mut found),
     };
     found = preferred(found, pairs);
     if first_is(&found, |best| best.effects.len() > 1 && !suffices(best)) {
-        let patterns = search.patterns(&found[..1]);
+        let several = (found.iter()).filter(|found| found.explanation.effects.len() > 1);
+        let patterns = search.patterns(of_other_effects(several).into_iter().take(PATTERNS_OF_SEVERAL));
         found = preferred(found, patterns);
     }
     if !first_is(&found, |best| suffices(best) || best.share > MOST) {

@@ -4,6 +4,7 @@ use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
 use rayon::prelude::*;
 
 use super::atlas::{Atlas, White};
+use super::hunt::Hunt;
 use super::hypothesis::{Hypothesis, Part, Shape};
 use super::refine::Descent;
 use super::screen::{BEYOND, price, tangent};
@@ -223,7 +224,7 @@ impl Tried {
 impl Search<'_> {
     /// Pairs that are looked for together, and explain nearly all of a strong signal where they are simulated, tried to the end.
     pub(super) fn clear_pairs(&self) -> Vec<Found> {
-        const NEARLY_ALL: f64 = 0.95;
+        const NEARLY_ALL: f64 = 0.9;
         let all = 0.5 * self.excess(self.residual);
         if all < STRONG {
             return Vec::new();
@@ -233,24 +234,24 @@ impl Search<'_> {
             return Vec::new();
         }
         let mut tried = Tried::new(&ROUNDS_OF_SEVERAL, f64::NEG_INFINITY);
-        self.descend_on(&mut tried, self.best_together());
+        self.try_together(&mut tried);
         self.with_exchanged(tried)
     }
 
     /// The best pairs, tried to the end until one leaves nothing significant: those that together explain most as far as actions add
     /// up, the best single effects with what explains their remainder best, and sizes that jump with another effect, which come
-    /// first where they promise more.
-    pub(super) fn pairs(&self, singles: &[Found]) -> Vec<Found> {
+    /// first where they promise more. Before these come last, sizes that jump are tried for themselves and added to the single
+    /// effects, if that was not done yet.
+    pub(super) fn pairs(&self, singles: &mut Vec<Found>) -> Vec<Found> {
         let mut tried = Tried::new(&ROUNDS_OF_SEVERAL, f64::NEG_INFINITY);
-        let left_together = self.together().first().map_or(f64::INFINITY, |best| best.left);
-        let hunts = self.was_scanned().then(|| self.hunts_of_pairs());
-        let first = hunts.iter().flatten().next();
-        let jumps_first = first.is_some_and(|(left, _)| *left < left_together);
-        if let Some(hunts) = hunts.as_ref().filter(|_| jumps_first) {
-            self.descend_on(&mut tried, self.pairs_that_jump(hunts));
+        let mut hunts = self.promising_hunts();
+        let beats_others = |left: f64| self.together().first().is_none_or(|best| left < best.left);
+        let jumps_first = hunts.first().is_some_and(|(left, _)| beats_others(*left));
+        if jumps_first {
+            self.descend_on(&mut tried, self.pairs_that_jump(&hunts));
         }
         if !tried.fits() {
-            self.descend_on(&mut tried, self.best_together());
+            self.try_together(&mut tried);
         }
         if !tried.fits() {
             let mut known = tried.starts.clone();
@@ -263,17 +264,42 @@ impl Search<'_> {
             self.descend_on(&mut tried, further);
         }
         if !tried.fits() && !jumps_first && !self.explains_most(&tried) {
-            let hunts = hunts.unwrap_or_else(|| self.hunts_of_pairs());
+            if !self.was_scanned() {
+                self.scan(singles);
+                if singles.first().is_some_and(Found::fits) {
+                    return self.settle(tried.descents);
+                }
+            }
+            if hunts.is_empty() {
+                hunts = self.hunts_of_pairs(&self.screened_pairs_that_jump());
+            }
             self.descend_on(&mut tried, self.pairs_that_jump(&hunts));
         }
         self.with_exchanged(tried)
     }
 
-    /// The best of the pairs that are looked for together.
-    fn best_together(&self) -> Vec<Hypothesis> {
+    /// Pairs with a size that jumps, if sizes were simulated all over their range and these pairs promise more than those that are
+    /// looked for together: they promise rather more than they keep.
+    fn promising_hunts(&self) -> Vec<(f64, Hunt)> {
+        if !self.was_scanned() {
+            return Vec::new();
+        }
+        let screened = self.screened_pairs_that_jump();
+        let promise = screened.first().map_or(f64::NEG_INFINITY, |best| best.score);
+        if self.together().first().is_some_and(|best| promise < best.score) {
+            return Vec::new();
+        }
+        self.hunts_of_pairs(&screened)
+    }
+
+    /// Adds the best of the pairs that are looked for together, from which is descended once.
+    fn try_together(&self, tried: &mut Tried) {
         const PAIRS: usize = 5;
         let best = self.together().iter().take(PAIRS);
-        best.map(|pair| pair.hypothesis.clone()).collect()
+        let best: Vec<Hypothesis> = best.map(|pair| pair.hypothesis.clone()).collect();
+        let descend = || self.descend_several(&best, &ROUNDS_OF_SEVERAL, f64::NEG_INFINITY);
+        (tried.descents).extend(self.descended_together.get_or_init(descend).iter().cloned());
+        tried.starts.extend(best);
     }
 
     /// Pairs that together explain most as far as actions add up, as simulations where they were screened rank them; simulated

@@ -26,18 +26,10 @@ pub(super) struct Probe {
     pub(super) scanned: u32,
     /// Whether its size is a limit, which does the more the smaller it is and nothing where it is large.
     limit: bool,
-    /// Data sets simulated beforehand for each size.
-    pub(super) sets: u64,
 }
 
 /// Share of a size over which its action is about linear.
 const STEP: f64 = 0.15;
-
-/// Data sets simulated beforehand for each size of a probe.
-pub(super) const PROBE_SETS: u64 = 4;
-
-/// The same where there are many places of one effect.
-const PLACE_SETS: u64 = 4;
 
 impl Probe {
     /// Numbers to fit without a path: a group of basis functions.
@@ -53,7 +45,6 @@ impl Probe {
             quantum: None,
             scanned: 0,
             limit: false,
-            sets: PROBE_SETS,
         }
     }
 
@@ -202,7 +193,6 @@ fn probe(name: &str, fixed: &[(&str, f64)], sizes: &[f64], free: &[(&str, f64)])
         quantum: None,
         scanned: jumping.map_or(0, |jumping| jumping.1),
         limit,
-        sets: PROBE_SETS,
     }]
 }
 
@@ -261,11 +251,7 @@ fn places(name: &str, length_m: f64, size: f64) -> Vec<Probe> {
             let position = (f64::from(k) + 0.5) / f64::from(PLACES);
             let fixed = [("wall", wall), ("position", position), ("length_m", length_m)];
             let free = [("position", 0.008), ("length_m", 0.015)];
-            let few = |p| Probe {
-                sets: PLACE_SETS,
-                ..p
-            };
-            probes.extend(mirrored(probe(name, &fixed, &[size], &free)).into_iter().map(few));
+            probes.extend(mirrored(probe(name, &fixed, &[size], &free)));
         }
     }
     probes

@@ -10,7 +10,7 @@ use super::hunt::{Hunt, Look};
 use super::hypothesis::{Hypothesis, Part, Shape};
 use super::pairs::{Columns, Piece};
 use super::refine::Descent;
-use super::search::{BASES, Found, ROUNDS_OF_SEVERAL, Search, near};
+use super::search::{BASES, Found, ROUNDS_OF_SEVERAL, Search, near, sort};
 
 /// What a probe that jumps leaves of the data beside a base at sizes all over its range.
 #[derive(Debug, Clone)]
@@ -24,8 +24,8 @@ pub(super) struct Scan {
 }
 
 /// A probe beside one that jumps, at the sizes that together leave least of the data.
-struct Beside {
-    score: f64,
+pub(super) struct Beside {
+    pub(super) score: f64,
     other: usize,
     other_size: f64,
     jumping: usize,
@@ -151,8 +151,18 @@ impl Atlas {
 }
 
 impl Search<'_> {
-    /// Effects whose action jumps with their size, at the best of many sizes.
-    pub(super) fn scans(&self) -> Vec<Found> {
+    /// Adds effects whose action jumps with their size, at the best of many sizes, to single effects: they replace those at which
+    /// descents ended.
+    pub(super) fn scan(&self, singles: &mut Vec<Found>) {
+        let scans = self.scans();
+        if !scans.is_empty() {
+            singles.retain(|found| !self.jumped(found));
+        }
+        singles.extend(scans);
+        sort(singles);
+    }
+
+    fn scans(&self) -> Vec<Found> {
         let nothing = self.atlas.at_rest(Hypothesis { parts: Vec::new() });
         let closer = |scan: &Scan| {
             self.tell(format_args!(
@@ -186,11 +196,15 @@ impl Search<'_> {
         })
     }
 
-    /// Pairs of an effect that jumps and one that does not, the most promising first, with the squared distance that they leave as far
-    /// as the other's size follows. What both do is taken to add up where they are looked for: no single effect need come near.
-    pub(super) fn hunts_of_pairs(&self) -> Vec<(f64, Hunt)> {
+    /// The most promising pairs of an effect that jumps and one that does not. What both do is taken to add up: no single effect need
+    /// come near.
+    pub(super) fn screened_pairs_that_jump(&self) -> Vec<Beside> {
         const HEARD: usize = 8;
-        let beside = (self.atlas).screen_beside_scans(self.residual, self.scanned(), HEARD);
+        (self.atlas).screen_beside_scans(self.residual, self.scanned(), HEARD)
+    }
+
+    /// Such pairs, those that come nearest first, with the squared distance that they leave as far as the other's size follows.
+    pub(super) fn hunts_of_pairs(&self, screened: &[Beside]) -> Vec<(f64, Hunt)> {
         self.tell(format_args!("which sizes that jump go with another effect"));
         let look = |beside: &Beside| {
             let other = Part::screened(self.atlas, beside.other, Shape::Constant, &[beside.other_size]);
@@ -198,7 +212,7 @@ impl Search<'_> {
             let hunt = Hunt::new(base, beside.jumping, beside.size, beside.spacing);
             self.atlas.hunted_once(self.simulate, self.data, hunt)
         };
-        let mut hunts: Vec<(f64, Hunt)> = beside.par_iter().filter_map(look).collect();
+        let mut hunts: Vec<(f64, Hunt)> = screened.par_iter().filter_map(look).collect();
         hunts.sort_by(|a, b| a.0.total_cmp(&b.0));
         hunts
     }

@@ -38,6 +38,13 @@ pub(super) struct Found {
     residual: White,
 }
 
+impl Found {
+    /// Whether nothing significant is left.
+    pub(super) fn fits(&self) -> bool {
+        (self.explanation.remainder_p).is_some_and(|p| p >= SIGNIFICANT_P)
+    }
+}
+
 /// A search for explanations of one data set.
 pub(super) struct Search<'a> {
     pub(super) atlas: &'a Atlas,
@@ -51,6 +58,8 @@ pub(super) struct Search<'a> {
     pub(super) scanned: OnceLock<Vec<Scan>>,
     /// Pairs that are looked for together, once they were asked for.
     pub(super) together: OnceLock<Vec<ScreenedPair>>,
+    /// Where descents from the best of these led, once they were tried.
+    pub(super) descended_together: OnceLock<Vec<Descent>>,
 }
 
 /// Rounds of a descent, each with the log-likelihood, and the share of the best one's, by which what lies behind then does
@@ -184,7 +193,7 @@ impl Search<'_> {
 
     /// The best explanations with a size that goes over the runs or in time, where what they leave does, all in all or along
     /// what a single effect does, tried to the end.
-    pub(super) fn patterns(&self, best: &[Found]) -> Vec<Found> {
+    pub(super) fn patterns<'f>(&self, best: impl Iterator<Item = &'f Found>) -> Vec<Found> {
         let mut starts: Vec<Hypothesis> = Vec::new();
         for found in best {
             let Some(left) = found.explanation.remainder else {

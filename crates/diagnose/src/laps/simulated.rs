@@ -19,7 +19,15 @@ pub(super) const FINAL_SETS: u64 = 32;
 pub(super) struct Evaluated {
     pub(super) expectation: Expectation,
     pub(super) doubt: Doubt,
+    /// Whether its draws do more to it than to the declared model.
+    noisier: bool,
     pub(super) summaries: Vec<Summary>,
+}
+
+/// What draws do to a hypothesis in units of what they do to the declared model, by the sums of the products of both deviations and of
+/// the declared model's squares. The share is at most 1: the same draws then do the same to all that are compared, however noisy.
+fn share_told(both: f64, of_declared: f64) -> f64 {
+    (both / of_declared.max(f64::MIN_POSITIVE)).clamp(0.0, 1.0)
 }
 
 impl Atlas {
@@ -61,6 +69,37 @@ impl Atlas {
     ) -> Option<Expectation> {
         let summaries = self.summaries(simulate, settings, sets)?;
         Some(Expectation::of(summaries.iter(), self.alike))
+    }
+
+    /// The same by as few of the data sets as make it as good with the control variate of [`Atlas::evaluate`].
+    pub(super) fn simulated_briefly(
+        &self,
+        simulate: &Simulate<'_>,
+        settings: &[Setting],
+        sets: Range<u64>,
+    ) -> Option<Expectation> {
+        let alike = self.are_alike(settings);
+        // How runs differ that should be alike tells what draws do, or else how data sets do.
+        let runs_tell = alike && self.layout.laps.iter().any(|laps| laps.len() > 1);
+        let fewest = if runs_tell { 1 } else { 2 };
+        let all = sets.end - sets.start;
+        if all < fewest {
+            return self.simulated_plainly(simulate, settings, sets);
+        }
+        let summaries = self.summaries(simulate, settings, sets.start..sets.start + fewest)?;
+        let first = self.paired(summaries, sets.start, alike);
+        // Of a robot that is noisier than the declared one draws tell little.
+        if first.noisier {
+            return self.simulated_plainly(simulate, settings, sets);
+        }
+        let of_one = first.doubt.error * fewest as f64;
+        let enough = ((of_one * all as f64).round() as u64).clamp(fewest, all);
+        if enough == fewest {
+            return Some(first.expectation);
+        }
+        let mut summaries = first.summaries;
+        summaries.extend(self.summaries(simulate, settings, sets.start + fewest..sets.start + enough)?);
+        Some(self.paired(summaries, sets.start, alike).expectation)
     }
 
     /// What effects leave of the data, in units of their own scatter; `None` where the robot crashes. That a lap is lost now and
@@ -107,12 +146,18 @@ impl Atlas {
         let mut summaries = evaluated.summaries;
         let done = summaries.len() as u64;
         summaries.extend(self.summaries(simulate, &hypothesis.settings(self), done..sets.max(done))?);
-        Some(self.paired(summaries, evaluated.doubt.alike))
+        Some(self.paired(summaries, 0, evaluated.doubt.alike))
     }
 
-    fn simulated(&self, simulate: &Simulate<'_>, settings: &[Setting], sets: u64) -> Option<Evaluated> {
+    /// Settings simulated with so many data sets; `None` where the robot crashes.
+    pub(super) fn simulated(
+        &self,
+        simulate: &Simulate<'_>,
+        settings: &[Setting],
+        sets: u64,
+    ) -> Option<Evaluated> {
         let summaries = self.summaries(simulate, settings, 0..sets)?;
-        Some(self.paired(summaries, self.are_alike(settings)))
+        Some(self.paired(summaries, 0, self.are_alike(settings)))
     }
 
     /// Whether the declared model with these effects does the same in every run.
@@ -120,9 +165,10 @@ impl Atlas {
         self.alike && settings.iter().all(Setting::same_in_every_run)
     }
 
-    /// The first so many data sets of a hypothesis, each with the same draws as the declared model's.
-    fn paired(&self, summaries: Vec<Summary>, alike: bool) -> Evaluated {
-        let declared: Vec<&Expectation> = self.samples[..summaries.len()].iter().collect();
+    /// Data sets of a hypothesis from one on, each with the same draws as the declared model's.
+    fn paired(&self, summaries: Vec<Summary>, first: u64, alike: bool) -> Evaluated {
+        let same_draws = self.samples.iter().skip(first as usize);
+        let declared: Vec<&Expectation> = same_draws.take(summaries.len()).collect();
         self.evaluated(summaries, &declared, alike)
     }
 
@@ -148,21 +194,35 @@ impl Atlas {
         let sets = summaries.len();
         let mean = Expectation::of(summaries.iter(), alike);
         let declared_mean = Expectation::mean(declared, alike);
-        let (mut both, mut own) = (0.0, 0.0);
+        let (mut both, mut of_declared) = (0.0, 0.0);
         for (summary, &sample) in summaries.iter().zip(declared) {
             let sample = self.white(sample, &declared_mean);
-            both += self
-                .white(&Expectation::of(std::iter::once(summary), false), &mean)
-                .dot(&sample);
-            own += sample.norm_squared();
+            let found = self.white(&Expectation::of(std::iter::once(summary), false), &mean);
+            both += found.dot(&sample);
+            of_declared += sample.norm_squared();
         }
-        let share = (both / own).clamp(0.0, 1.0);
+        let share = share_told(both, of_declared);
         let expectation = mean.moved(share, &declared_mean, &self.null);
+        // As if it scattered as the declared model does.
         let error = (1.0 - share * share) / sets as f64 + share * share / self.samples.len() as f64;
         Evaluated {
             expectation,
             doubt: Doubt { error, alike },
+            noisier: share >= 1.0,
             summaries,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::share_told;
+
+    #[test]
+    fn draws_tell_at_most_what_they_do_to_the_declared_model() {
+        for (both, share) in [(10.0, 1.0), (5.0, 1.0), (2.5, 0.5), (-1.0, 0.0)] {
+            assert_eq!(share_told(both, 5.0), share);
+        }
+        assert_eq!(share_told(0.0, 0.0), 0.0);
     }
 }

@@ -59,7 +59,7 @@ impl Atlas {
         let without = if others.is_empty() {
             self.declared_mean(0..SETS)
         } else {
-            self.simulated_plainly(simulate, &others, 0..SETS)?
+            self.simulated_briefly(simulate, &others, 0..SETS)?
         };
         let directions = self.directions_of(&with, &without);
         let sizes = |data: &Runs| self.sizes_along(&directions, data);
