@@ -19,15 +19,26 @@ pub(super) const FINAL_SETS: u64 = 32;
 pub(super) struct Evaluated {
     pub(super) expectation: Expectation,
     pub(super) doubt: Doubt,
-    /// Whether its draws do more to it than to the declared model.
-    noisier: bool,
     pub(super) summaries: Vec<Summary>,
 }
 
-/// What draws do to a hypothesis in units of what they do to the declared model, by the sums of the products of both deviations and of
-/// the declared model's squares. The share is at most 1: the same draws then do the same to all that are compared, however noisy.
-fn share_told(both: f64, of_declared: f64) -> f64 {
-    (both / of_declared.max(f64::MIN_POSITIVE)).clamp(0.0, 1.0)
+/// What draws do to a hypothesis, as far as what they do to the declared model tells it.
+struct Control {
+    /// Of the one, in units of the other.
+    share: f64,
+    /// The square of their correlation.
+    told: f64,
+}
+
+impl Control {
+    /// By the sums of the products of deviations from the means, and of the squares of either.
+    fn new(both: f64, own: f64, of_declared: f64) -> Self {
+        let share = (both / of_declared.max(f64::MIN_POSITIVE)).max(0.0);
+        Self {
+            share,
+            told: share * both / own.max(f64::MIN_POSITIVE),
+        }
+    }
 }
 
 impl Atlas {
@@ -88,10 +99,6 @@ impl Atlas {
         }
         let summaries = self.summaries(simulate, settings, sets.start..sets.start + fewest)?;
         let first = self.paired(summaries, sets.start, alike);
-        // Of a robot that is noisier than the declared one draws tell little.
-        if first.noisier {
-            return self.simulated_plainly(simulate, settings, sets);
-        }
         let of_one = first.doubt.error * fewest as f64;
         let enough = ((of_one * all as f64).round() as u64).clamp(fewest, all);
         if enough == fewest {
@@ -194,21 +201,20 @@ impl Atlas {
         let sets = summaries.len();
         let mean = Expectation::of(summaries.iter(), alike);
         let declared_mean = Expectation::mean(declared, alike);
-        let (mut both, mut of_declared) = (0.0, 0.0);
+        let (mut both, mut own, mut of_declared) = (0.0, 0.0, 0.0);
         for (summary, &sample) in summaries.iter().zip(declared) {
             let sample = self.white(sample, &declared_mean);
             let found = self.white(&Expectation::of(std::iter::once(summary), false), &mean);
             both += found.dot(&sample);
+            own += found.norm_squared();
             of_declared += sample.norm_squared();
         }
-        let share = share_told(both, of_declared);
+        let Control { share, told } = Control::new(both, own, of_declared);
         let expectation = mean.moved(share, &declared_mean, &self.null);
-        // As if it scattered as the declared model does.
-        let error = (1.0 - share * share) / sets as f64 + share * share / self.samples.len() as f64;
+        let error = (1.0 - told) / sets as f64 + told / self.samples.len() as f64;
         Evaluated {
             expectation,
             doubt: Doubt { error, alike },
-            noisier: share >= 1.0,
             summaries,
         }
     }
@@ -216,13 +222,26 @@ impl Atlas {
 
 #[cfg(test)]
 mod tests {
-    use super::share_told;
+    use super::Control;
 
     #[test]
-    fn draws_tell_at_most_what_they_do_to_the_declared_model() {
-        for (both, share) in [(10.0, 1.0), (5.0, 1.0), (2.5, 0.5), (-1.0, 0.0)] {
-            assert_eq!(share_told(both, 5.0), share);
+    fn draws_that_do_twice_as_much_are_told_altogether() {
+        let control = Control::new(2.0 * 5.0, 4.0 * 5.0, 5.0);
+        assert_eq!((control.share, control.told), (2.0, 1.0));
+    }
+
+    #[test]
+    fn draws_of_a_noisier_robot_are_told_in_part() {
+        // Own deviations are the declared model's and others of three times their square.
+        let control = Control::new(5.0, 4.0 * 5.0, 5.0);
+        assert_eq!((control.share, control.told), (1.0, 0.25));
+    }
+
+    #[test]
+    fn without_deviations_nothing_is_told() {
+        for (both, own, of_declared) in [(0.0, 0.0, 0.0), (-1.0, 2.0, 2.0)] {
+            let control = Control::new(both, own, of_declared);
+            assert_eq!((control.share, control.told), (0.0, 0.0));
         }
-        assert_eq!(share_told(0.0, 0.0), 0.0);
     }
 }
