@@ -156,33 +156,38 @@ impl Scatter {
 
     /// The scatter of the laps of these recordings where they are too few to know it well: drawn towards one that has the
     /// principal axes of another, as far as chance explains the difference (Ledoit and Wolf 2004), and so is that of the
-    /// second-order numbers. Recordings that were simulated with the same draws and hardly differ count as one: there are so
-    /// many `copies`, one after the other.
+    /// second-order numbers. There may be several `copies` of the same recordings, one after the other, simulated with the same draws at
+    /// other sizes. How well all of them tell the scatter shows in how well it fits laps that it was not made of.
     pub(super) fn near<'a>(
         recordings: impl Iterator<Item = &'a Recording>,
         copies: usize,
         other: &Self,
     ) -> Option<Self> {
         let all: Vec<&Recording> = recordings.collect();
-        let (own, freedom) = pooled(all.iter().copied(), other.open.nrows());
+        let size = other.open.nrows();
+        let (own, freedom) = pooled(all.iter().copied(), size);
         let freedom = freedom / copies as f64;
-        let size = own.nrows();
         let along = |covariance: &DMatrix<f64>| other.axes.tr_mul(covariance) * &other.axes;
         let others = along(&other.of_lap()).diagonal();
         let along = along(&own);
         let wider = smoothed(&along.diagonal().component_div(&others));
         let target = others.component_mul(&wider);
-        let apart: f64 = (0..size)
-            .flat_map(|i| (0..size).map(move |j| (i, j)))
-            .map(|(i, j)| {
-                let chance = along[(i, j)] / (target[i] * target[j]).sqrt();
-                (chance - if i == j { 1.0 } else { 0.0 }).powi(2)
-            })
-            .sum();
-        let share = share_by_chance(apart, freedom, size);
+        let in_its_units =
+            DMatrix::from_fn(size, size, |i, j| along[(i, j)] / (target[i] * target[j]).sqrt());
+        let share = share_by_chance(in_its_units, freedom);
         let target = &other.axes * DMatrix::from_diagonal(&target) * other.axes.transpose();
         let second = other.second_near(&all, copies)?;
-        other.blended(own, freedom, target, share, second)
+        let parts = in_parts(&all, copies, size);
+        if parts.len() < 3 {
+            return other.blended(own, freedom, target, share, second);
+        }
+        let wider = wider_by_new_laps(&parts, &target, share)?;
+        // As for a Wishart distribution, the more recordings the better; the target's axes are no better known than they are.
+        let of_parts_but_one = freedom_of(wider, size);
+        let freedom = of_parts_but_one * parts.len() as f64 / (parts.len() as f64 - 1.0);
+        let freedom = (freedom.recip() + share.powi(2) / other.freedom).recip();
+        let lap = (own * (1.0 - share) + target * share) * wider.min(1.0);
+        Self::with(lap, freedom, second, other.open.clone(), other.axes.clone())
     }
 
     /// The covariance of the second-order numbers of these recordings: this one's with variances that are theirs as far as
@@ -214,14 +219,13 @@ impl Scatter {
         recordings: impl Iterator<Item = &'a Recording> + Clone,
     ) -> Option<Self> {
         let (own, freedom) = pooled(recordings, self.open.nrows());
-        let size = own.nrows();
         let common = self.of_lap();
         let root = common.clone().cholesky()?;
-        let mut apart = &own - &common;
-        root.l_dirty().solve_lower_triangular_mut(&mut apart);
-        apart.transpose_mut();
-        root.l_dirty().solve_lower_triangular_mut(&mut apart);
-        let share = share_by_chance(apart.norm_squared(), freedom, size);
+        let mut in_its_units = own.clone();
+        root.l_dirty().solve_lower_triangular_mut(&mut in_its_units);
+        in_its_units.transpose_mut();
+        root.l_dirty().solve_lower_triangular_mut(&mut in_its_units);
+        let share = share_by_chance(in_its_units, freedom);
         if share == 1.0 {
             return Some(self.clone());
         }
@@ -341,6 +345,43 @@ fn pooled<'a>(recordings: impl Iterator<Item = &'a Recording>, size: usize) -> (
     (lap / freedom, freedom)
 }
 
+/// The scatter of some recordings and its degrees of freedom in up to four parts, the copies of a recording in the same.
+fn in_parts(recordings: &[&Recording], copies: usize, size: usize) -> Vec<(DMatrix<f64>, f64)> {
+    const MOST: usize = 4;
+    let sets = recordings.len() / copies;
+    let mut parts = vec![(DMatrix::zeros(size, size), 0.0); sets.min(MOST)];
+    for (i, recording) in recordings.iter().enumerate() {
+        let (scatter, freedom) = &mut parts[i % sets % sets.min(MOST)];
+        *scatter += &recording.scatter;
+        *freedom += recording.freedom as f64;
+    }
+    parts
+}
+
+/// By how much a covariance of one lap, of parts of some recordings but one and of a share of a target, has to be multiplied for its inverse
+/// to fit the laps of that one.
+fn wider_by_new_laps(parts: &[(DMatrix<f64>, f64)], target: &DMatrix<f64>, share: f64) -> Option<f64> {
+    let all: DMatrix<f64> = parts.iter().map(|(scatter, _)| scatter).sum();
+    let freedom_of_all: f64 = parts.iter().map(|(_, freedom)| freedom).sum();
+    let mut wider = 0.0;
+    for (scatter, freedom) in parts {
+        let others = (&all - scatter) / (freedom_of_all - freedom);
+        let known = others * (1.0 - share) + target * share;
+        wider += known.cholesky()?.solve(scatter).trace() / freedom;
+    }
+    Some(wider / (parts.len() * target.nrows()) as f64)
+}
+
+/// Degrees of freedom with which a covariance is known whose inverse is unbiased once it is multiplied by this; see [`inflation`].
+fn freedom_of(wider: f64, size: usize) -> f64 {
+    const MOST: f64 = 1e5;
+    if wider > 1.0 {
+        (wider * (size as f64 + 1.0) / (wider - 1.0)).min(MOST)
+    } else {
+        MOST
+    }
+}
+
 /// Variances of the second-order numbers between recordings; of copies, one after the other, each about its own mean.
 fn variances_of_second(recordings: &[&Recording], copies: usize) -> DVector<f64> {
     let sets = recordings.len() / copies;
@@ -375,11 +416,24 @@ fn smoothed(ratios: &DVector<f64>) -> DVector<f64> {
     })
 }
 
-/// Share of a squared distance from what a covariance should be, in units of that, which chance explains if it was estimated
-/// with `freedom` degrees of freedom.
-fn share_by_chance(apart: f64, freedom: f64, size: usize) -> f64 {
-    let by_chance = (size * (size + 1)) as f64 / freedom;
-    (by_chance / apart).min(1.0)
+/// Share of the squared distance between a covariance and what it should be that chance explains if it was estimated with `freedom`
+/// degrees of freedom; it is given in units of what it should be. The same is asked of their inverses (Wishart, and inverse Wishart), and
+/// the lesser share counts: where a covariance is far smaller than it should be only the inverses differ much.
+fn share_by_chance(in_units: DMatrix<f64>, freedom: f64) -> f64 {
+    let size = in_units.nrows() as f64;
+    let ratios = in_units.symmetric_eigenvalues();
+    let apart = |times: f64, of: fn(f64) -> f64| -> f64 {
+        let squares = ratios.iter().map(|&ratio| (times * of(ratio) - 1.0).powi(2));
+        squares.sum::<f64>().max(f64::MIN_POSITIVE)
+    };
+    let share = size * (size + 1.0) / freedom / apart(1.0, |ratio| ratio);
+    let left = freedom - size - 1.0;
+    // The inverse has no variance otherwise.
+    if left <= 2.0 {
+        return share.min(1.0);
+    }
+    let by_chance = size * (left * (freedom - 1.0) / ((freedom - size) * (left - 2.0)) - 1.0);
+    share.min(by_chance / apart(left / freedom, f64::recip)).min(1.0)
 }
 
 /// What makes the inverse of a covariance estimated with `freedom` degrees of freedom in `size` dimensions unbiased (the mean
@@ -413,9 +467,17 @@ mod tests {
     /// Smooth deviations of a size along the lap, and noise of unit variance at every gate.
     fn covariance(smooth: f64) -> DMatrix<f64> {
         DMatrix::from_fn(SIZE, SIZE, |i, j| {
-            let apart = i.abs_diff(j) as f64 / 6.0;
-            smooth * (-0.5 * apart * apart).exp() + f64::from(u8::from(i == j))
+            smooth * correlation(i, j, 6.0) + one_if(i == j)
         })
+    }
+
+    fn correlation(i: usize, j: usize, gates: f64) -> f64 {
+        let apart = i.abs_diff(j) as f64 / gates;
+        (-0.5 * apart * apart).exp()
+    }
+
+    fn one_if(same: bool) -> f64 {
+        f64::from(u8::from(same))
     }
 
     fn drawn(root: &DMatrix<f64>, stream: &mut Stream) -> DVector<f64> {
@@ -430,7 +492,7 @@ mod tests {
         }
         Recording {
             runs: Vec::new(),
-            second: DVector::zeros(SECOND),
+            second: DVector::from_fn(SECOND, |_, _| stream.normal()),
             scatter,
             freedom,
         }
@@ -464,6 +526,37 @@ mod tests {
             // 30 +- 1.2 by chance.
             assert!((squares - 30.0).abs() < 3.6, "{smooth}: {squares}");
             assert!(off.abs() < 1.0, "{smooth}: {off}");
+        }
+    }
+
+    #[test]
+    fn the_scatter_of_a_robot_unlike_the_declared_one_is_as_wide_as_its_laps_are() {
+        let other = known(4.0);
+        // Twenty times the variance in shorter waves, and a twentieth of the noise.
+        let truth = DMatrix::from_fn(SIZE, SIZE, |i, j| {
+            80.0 * correlation(i, j, 4.0) + 0.05 * one_if(i == j)
+        });
+        let root = truth.cholesky().unwrap().l();
+        let mut stream = Streams { seed: 8, run: 0 }.open("laps");
+        const SETS: usize = 8;
+        const COPIES: usize = 3;
+        // Copies that are all the same tell nothing new; those that have nothing in common tell three times as much.
+        for differ in [false, true] {
+            let mut squares = 0.0;
+            const TIMES: usize = 40;
+            for _ in 0..TIMES {
+                let mut draw = || recording(&root, SIZE / 4, &mut stream);
+                let mut all: Vec<Recording> = (0..SETS).map(|_| draw()).collect();
+                for i in 0..(COPIES - 1) * SETS {
+                    let copy = if differ { draw() } else { all[i].clone() };
+                    all.push(copy);
+                }
+                let scatter = Scatter::near(all.iter(), COPIES, &other).unwrap();
+                let fresh = drawn(&root, &mut stream);
+                squares += scatter.whiten(&fresh).norm_squared() / TIMES as f64;
+            }
+            // 30 +- 1.2 by chance.
+            assert!((squares - 30.0).abs() < 4.0, "{differ}: {squares}");
         }
     }
 
@@ -510,7 +603,7 @@ mod tests {
     fn rivals_share_a_scatter_unless_theirs_differ_by_more_than_chance() {
         let common = known(4.0);
         let mut stream = Streams { seed: 6, run: 0 }.open("laps");
-        for (smooth, kept) in [(4.0, 0.1), (8.0, 0.8)] {
+        for (smooth, kept) in [(4.0, 0.15), (8.0, 0.8)] {
             let truth = covariance(smooth).cholesky().unwrap();
             let laps = recording(&truth.l(), 1000, &mut stream);
             let scatter = common.unless_apart(std::iter::once(&laps)).unwrap();
