@@ -349,9 +349,10 @@ fn pooled<'a>(recordings: impl Iterator<Item = &'a Recording>, size: usize) -> (
 fn in_parts(recordings: &[&Recording], copies: usize, size: usize) -> Vec<(DMatrix<f64>, f64)> {
     const MOST: usize = 4;
     let sets = recordings.len() / copies;
-    let mut parts = vec![(DMatrix::zeros(size, size), 0.0); sets.min(MOST)];
+    let count = sets.min(MOST);
+    let mut parts = vec![(DMatrix::zeros(size, size), 0.0); count];
     for (i, recording) in recordings.iter().enumerate() {
-        let (scatter, freedom) = &mut parts[i % sets % sets.min(MOST)];
+        let (scatter, freedom) = &mut parts[i % sets % count];
         *scatter += &recording.scatter;
         *freedom += recording.freedom as f64;
     }
