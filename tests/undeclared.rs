@@ -251,7 +251,7 @@ fn a_light_that_goes_over_the_runs_is_seen_beside_wheels_that_slip_much() {
     let scratch = Scratch::new();
     let mut robot = Robot::with(Setting::constant(sim::find("slip-level").unwrap(), [SLIP]));
     robot.controller = ground::rule_based();
-    // Of five laps a run about every other data set tells both.
+    // Runs of five laps are too short: two of seven such data sets have just the two names.
     robot.laps = vec![2 * LAPS; RUNS];
     robot.effects.push(Setting {
         spec: sim::find("directional-light").unwrap(),
