@@ -221,7 +221,7 @@ fn explain(search: &Search<'_>, mut found: Vec<Found>) -> Vec<Found> {
         if first_is(&clear, leaves_nothing_to_ask) {
             found = preferred(found, clear);
             if first_is(&found, |best| best.effects.len() > 1) {
-                return held_still(search, found);
+                return held_still(search, simplified(search, found));
             }
         }
         search.scan(&mut found);
@@ -263,7 +263,29 @@ fn explain(search: &Search<'_>, mut found: Vec<Found>) -> Vec<Found> {
         let unnamed = search.unnamed(&found);
         found = unless_named(found, unnamed);
     }
-    held_still(search, found)
+    held_still(search, simplified(search, found))
+}
+
+/// Explanations of which the first, if it claims several effects, needs each of them: one that may do nothing has stood for sizes of the
+/// others that were not the best ones yet.
+fn simplified(search: &Search<'_>, found: Vec<Found>) -> Vec<Found> {
+    let Some(best) = found.first().map(|best| &best.explanation) else {
+        return found;
+    };
+    if best.effects.len() < 2 || best.has_no_name() || verdict_of(best) == Verdict::Unexplained {
+        return found;
+    }
+    let rivals = indistinguishable(found.iter().map(|found| &found.explanation), ALTERNATIVE);
+    let mut fewer = search.without_idle(found[..rivals].iter());
+    if fewer.is_empty() {
+        return found;
+    }
+    let needed = best.effects.len();
+    let (first, rest): (Vec<Found>, Vec<Found>) = found
+        .into_iter()
+        .partition(|found| found.explanation.effects.len() >= needed);
+    fewer.extend(rest);
+    preferred(fewer, first)
 }
 
 /// Explanations of which the first, if a name is claimed, holds still within the runs: else what was seen to settle comes first.

@@ -317,6 +317,13 @@ impl Scatter {
         &l * l.transpose()
     }
 
+    /// The mean square of how laps of some recordings deviate from their runs, in units of one lap's covariance.
+    pub(super) fn mean_square<'a>(&self, recordings: impl Iterator<Item = &'a Recording>) -> f64 {
+        let size = self.open.nrows();
+        let (own, _) = pooled(recordings, size);
+        self.lap.solve(&own).trace() / size as f64
+    }
+
     /// A vector of one lap's covariance in units of it.
     pub(super) fn whiten(&self, lap: &DVector<f64>) -> DVector<f64> {
         whiten(&self.lap, lap)

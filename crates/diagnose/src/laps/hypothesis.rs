@@ -55,6 +55,18 @@ pub(super) struct Freedom {
 }
 
 impl Freedom {
+    /// A number that all runs share.
+    #[cfg(test)]
+    pub(super) fn shared(step: f64) -> Self {
+        Self {
+            part: 0,
+            run: None,
+            parameter: Some(0),
+            step,
+            quantum: None,
+        }
+    }
+
     /// The same number over another step, which is at least and at most such shares of its own.
     pub(super) fn over(self, step: f64, (least, most): (f64, f64)) -> Self {
         if self.quantum.is_some() {
@@ -179,7 +191,7 @@ impl Part {
     }
 
     /// Its size, the mean over the runs.
-    fn mean_size(&self, atlas: &Atlas) -> f64 {
+    pub(super) fn mean_size(&self, atlas: &Atlas) -> f64 {
         let size = atlas.probes[self.probe].size_index();
         self.values.iter().map(|values| values[size]).sum::<f64>() / self.values.len() as f64
     }
@@ -410,6 +422,22 @@ impl Hypothesis {
             p < CHANCE
         };
         self.parts.iter().enumerate().all(shows)
+    }
+
+    /// Its constant effects whose sizes are so few errors from doing nothing that they may do it.
+    pub(super) fn idle(&self, errors: &[(Freedom, f64)], atlas: &Atlas) -> Vec<usize> {
+        const ERRORS: f64 = 6.0;
+        let is_idle = |&number: &usize| {
+            let part = &self.parts[number];
+            let probe = &atlas.probes[part.probe];
+            let size = probe.size_index();
+            let is_size = |f: &Freedom| f.part == number && f.parameter == Some(size);
+            let fitted = errors.iter().find(|(freedom, _)| is_size(freedom));
+            let error = part.held.or(fitted.map(|(_, error)| *error));
+            part.shape == Shape::Constant
+                && error.is_some_and(|error| (part.values[0][size] - probe.neutral).abs() < ERRORS * error)
+        };
+        (0..self.parts.len()).filter(is_idle).collect()
     }
 
     /// The same with the sizes of these parts where it has their effects at a size that was found by trying many.

@@ -58,8 +58,14 @@ impl Atlas {
                 break;
             };
             local.columns = local.columns.into_iter().map(Column::without_noise).collect();
-            let Nearest { moves, errors, .. } =
-                self.nearest(data, &local.center, &local.scatter, &local.columns, &freedoms);
+            let Nearest { moves, errors, .. } = self.nearest(
+                data,
+                &local.center,
+                &local.scatter,
+                &local.columns,
+                &freedoms,
+                &[],
+            );
             let found = self.quantised(self.with_moves(&look.found, &freedoms, &moves));
             let certain = (errors.iter().zip(&freedoms))
                 .zip(&widest)
@@ -130,7 +136,14 @@ impl Atlas {
                 column.curvature.rows_mut(range.start, range.len()).fill(0.0);
             }
         }
-        let nearest = self.nearest(&data, &local.center, &local.scatter, &columns, &look.freedoms);
+        let nearest = self.nearest(
+            &data,
+            &local.center,
+            &local.scatter,
+            &columns,
+            &look.freedoms,
+            &own,
+        );
         let found = self.with_moves(&look.about, &look.freedoms, &nearest.moves);
         // The run itself is as expected, and so has no say.
         let hunted = self.hunt_about(simulate, &data, &found).unwrap_or(found);

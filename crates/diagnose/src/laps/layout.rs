@@ -52,6 +52,13 @@ impl Layout {
         start..start + self.lap
     }
 
+    /// Entries of a recording's mean laps and of its trend, each of which is a draw of the scatter of one lap.
+    pub(super) fn laps_of(&self, recording: usize) -> Vec<Range<usize>> {
+        let start = self.recording_start(recording);
+        let draw = |i: usize| start + i * self.lap..start + (i + 1) * self.lap;
+        (0..=self.laps[recording].len()).map(draw).collect()
+    }
+
     /// Entries of a recording's numbers of second order.
     pub(super) fn second(&self, recording: usize) -> Range<usize> {
         let start = self.trend(recording).end;

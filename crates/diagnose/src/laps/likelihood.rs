@@ -102,7 +102,7 @@ impl Atlas {
 
     /// Brings a residual to unit variance where the expectation is in doubt. Returns the logarithm of the determinant by which
     /// that widens the law, and the square of what lay where the doubt is.
-    fn allow_for(&self, residual: &mut White, doubt: Doubt) -> (f64, f64) {
+    pub(super) fn allow_for(&self, residual: &mut White, doubt: Doubt) -> (f64, f64) {
         let Doubt { error, alike } = doubt;
         let (mut widened, mut doubtful) = (0.0, 0.0);
         let mut run = 0;

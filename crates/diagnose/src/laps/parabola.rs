@@ -1,13 +1,15 @@
 //! The neighbourhood of a hypothesis: what a step in each of its numbers does to the expectation, as parabolas, and where
 //! on them the data are nearest.
 
+use std::ops::Range;
+
 use nalgebra::{DMatrix, DVector};
 
 use super::atlas::{Atlas, Simulate, White, white};
 use super::expectation::{Expectation, Scatter};
 use super::hypothesis::{Freedom, Hypothesis};
 use super::layout::Layout;
-use super::likelihood::Fit;
+use super::likelihood::{Doubt, Fit};
 use super::simulated::Evaluated;
 
 impl Atlas {
@@ -68,6 +70,10 @@ impl Atlas {
             column.doubt = (a.slope - b.slope) * (0.5 * of_all);
             column.curvature_doubt = (a.curvature - b.curvature) * (0.5 * of_all);
         }
+        let widenings = sides.iter().flat_map(|side| self.widenings(&scatter, side));
+        for (column, widening) in columns.iter_mut().zip(widenings) {
+            column.widening = widening;
+        }
         Some(Local {
             center,
             scatter,
@@ -75,7 +81,30 @@ impl Atlas {
             sides: sides.into_iter().map(|(_, down, up)| [down, up]).collect(),
         })
     }
+
+    /// What each number of a group does to the scatter of laps, as the points to either side tell it.
+    fn widenings(&self, scatter: &[Scatter], side: &Side) -> Vec<Vec<f64>> {
+        let (group, (down_by, down), (up_by, up)) = side;
+        let squares = |g: usize, evaluated: &Evaluated| {
+            scatter[g].mean_square(evaluated.summaries.iter().map(|summary| &summary.0[g]))
+        };
+        let changes: Vec<f64> = (0..scatter.len())
+            .map(|g| (squares(g, up) / squares(g, down)).ln())
+            .collect();
+        let of_number = |(i, freedom): (usize, &Freedom)| {
+            let between = up_by[i] - down_by[i];
+            let widening = |(g, change): (usize, &f64)| {
+                let widening = change * freedom.share_of_scatter(g, &self.layout) / between;
+                if between == 0.0 { 0.0 } else { widening }
+            };
+            changes.iter().enumerate().map(widening).collect()
+        };
+        group.iter().enumerate().map(of_number).collect()
+    }
 }
+
+/// Numbers that are moved together, and what was simulated to either side of them with the moves that lead there.
+type Side = (Vec<Freedom>, (Vec<f64>, Evaluated), (Vec<f64>, Evaluated));
 
 /// Freedoms that are moved together: the sizes of one part in its runs.
 pub(super) fn groups(freedoms: &[Freedom]) -> Vec<Vec<Freedom>> {
@@ -94,6 +123,16 @@ impl Freedom {
     pub(super) fn own_share(&self, action: &White, layout: &Layout) -> White {
         self.run()
             .map_or_else(|| action.clone(), |run| of_run(action, run, layout))
+    }
+
+    /// Its share of what its group does to the scatter of a recording's laps.
+    fn share_of_scatter(&self, recording: usize, layout: &Layout) -> f64 {
+        let runs = layout.laps[recording].len() as f64;
+        match self.run().and_then(|run| layout.places().nth(run)) {
+            None => 1.0,
+            Some((own, _)) if own == recording => 1.0 / runs,
+            Some(_) => 0.0,
+        }
     }
 }
 
@@ -131,6 +170,8 @@ pub(super) struct Column {
     /// How the slope is off for the simulation's own error, and how the curvature is: one draw of each.
     pub(super) doubt: White,
     curvature_doubt: White,
+    /// Slope of the logarithm of the variance of laps, recording by recording.
+    widening: Vec<f64>,
 }
 
 impl Local {
@@ -150,6 +191,7 @@ impl Column {
             curvature: self.curvature.clone(),
             doubt: &self.doubt + &self.curvature_doubt * (2.0 * moved),
             curvature_doubt: self.curvature_doubt.clone(),
+            widening: self.widening.clone(),
         }
     }
 
@@ -177,6 +219,7 @@ impl Column {
                 curvature: &slope * 0.0,
                 doubt: &slope * 0.0,
                 curvature_doubt: &slope * 0.0,
+                widening: Vec::new(),
                 slope,
             };
         }
@@ -185,6 +228,7 @@ impl Column {
         Self {
             doubt: &slope * 0.0,
             curvature_doubt: &slope * 0.0,
+            widening: Vec::new(),
             slope,
             curvature,
         }
@@ -203,7 +247,8 @@ pub(super) struct Nearest {
 }
 
 impl Atlas {
-    /// Where parabolas through a simulated hypothesis are nearest to the data, in units of a scatter.
+    /// Where parabolas through a simulated hypothesis are nearest to the data, in units of a scatter that widens with its numbers: where
+    /// the likelihood is highest. Entries in `silent` have no say.
     pub(super) fn nearest(
         &self,
         data: &Expectation,
@@ -211,44 +256,143 @@ impl Atlas {
         scatter: &[Scatter],
         columns: &[Column],
         freedoms: &[Freedom],
+        silent: &[Range<usize>],
     ) -> Nearest {
         let target = white(scatter, &self.layout, data, &center.expectation);
-        let (moves, covariance) = nearest(columns, &target, freedoms);
+        let laps = self.laps_of(center.doubt, silent);
+        let (moves, covariance) = nearest(columns, &target, freedoms, &laps);
         let moves = DVector::from_fn(moves.len(), |i, _| freedoms[i].possible(moves[i]));
         let left = left_of(columns, &target, &moves);
+        let wider = wider(columns, &moves, laps.entries.len());
         let variances = covariance.diagonal() * (1.0 + center.doubt.error);
+        let mut fit = self.fit_of(data, left.clone(), scatter, center.doubt);
+        fit.gain -= 0.5 * laps.more(&left, &wider);
+        for (g, wider) in wider.iter().enumerate() {
+            for range in self.layout.laps_of(g) {
+                fit.residual
+                    .rows_mut(range.start, range.len())
+                    .scale_mut((-0.5 * wider).exp());
+            }
+        }
         Nearest {
             errors: variances.iter().map(|variance| variance.sqrt()).collect(),
-            hoped: 0.5 * (target.norm_squared() - left.norm_squared()),
-            fit: self.fit_of(data, left, scatter, center.doubt),
+            hoped: 0.5 * (target.norm_squared() - laps.distance(&left, &wider)),
+            fit,
             moves,
             covariance,
         }
     }
+
+    /// The entries that tell the scatter of laps where an expectation is in doubt.
+    fn laps_of(&self, doubt: Doubt, silent: &[Range<usize>]) -> Laps<'_> {
+        let of_recording = |g: usize| {
+            let all = self.layout.laps_of(g);
+            let counted = all.iter().filter(|range| !silent.contains(range));
+            counted.map(Range::len).sum::<usize>() as f64
+        };
+        Laps {
+            entries: (0..self.layout.laps.len()).map(of_recording).collect(),
+            squares: Box::new(move |left: &White| {
+                let mut left = left.clone();
+                self.allow_for(&mut left, doubt);
+                let square = |range: Range<usize>| left.rows(range.start, range.len()).norm_squared();
+                let of_recording = |g: usize| self.layout.laps_of(g).into_iter().map(square).sum();
+                (0..self.layout.laps.len()).map(of_recording).collect()
+            }),
+        }
+    }
+}
+
+/// What runs' mean laps and trends, draws of the scatter of a lap, tell of that scatter, recording by recording.
+struct Laps<'a> {
+    /// How many numbers they are.
+    entries: Vec<f64>,
+    /// The sum of their squares, in units of the scatter and of the simulation's error.
+    squares: Squares<'a>,
+}
+
+type Squares<'a> = Box<dyn Fn(&White) -> Vec<f64> + 'a>;
+
+impl Laps<'_> {
+    /// Squared distance, and the logarithm of the determinant of the scatter, that a scatter adds which is wider by these logarithms.
+    fn more(&self, left: &White, wider: &[f64]) -> f64 {
+        let of_recording = |((square, entries), wider): ((f64, &f64), &f64)| {
+            ((-wider).exp() - 1.0) * square + entries * wider
+        };
+        let squares = (self.squares)(left).into_iter();
+        squares.zip(&self.entries).zip(wider).map(of_recording).sum()
+    }
+
+    /// Squared distance and that.
+    fn distance(&self, left: &White, wider: &[f64]) -> f64 {
+        left.norm_squared() + self.more(left, wider)
+    }
+
+    /// Slope of the log-likelihood along the logarithm of each recording's variance. What is left of data that another effect is in
+    /// says little of the scatter: of a far too large one no more than half too much counts.
+    fn slopes(&self, left: &White, wider: &[f64]) -> Vec<f64> {
+        const MOST: f64 = 1.5;
+        let slope = |((square, entries), wider): ((f64, &f64), &f64)| {
+            0.5 * (((-wider).exp() * square).min(MOST * entries) - entries)
+        };
+        let squares = (self.squares)(left).into_iter();
+        squares.zip(&self.entries).zip(wider).map(slope).collect()
+    }
+}
+
+/// The logarithm by which moves make the variance of the laps of each of so many recordings larger.
+fn wider(columns: &[Column], moves: &DVector<f64>, recordings: usize) -> Vec<f64> {
+    let of_recording = |g: usize| {
+        (columns.iter().zip(moves.iter()))
+            .map(|(column, moved)| column.widening[g] * moved)
+            .sum()
+    };
+    (0..recordings).map(of_recording).collect()
 }
 
 /// The moves that bring the parabolas nearest to the target, and their covariance.
-fn nearest(columns: &[Column], target: &White, freedoms: &[Freedom]) -> (DVector<f64>, DMatrix<f64>) {
+fn nearest(
+    columns: &[Column],
+    target: &White,
+    freedoms: &[Freedom],
+    laps: &Laps<'_>,
+) -> (DVector<f64>, DMatrix<f64>) {
     let count = columns.len();
+    let recordings = laps.entries.len();
     let mut moves = DVector::<f64>::zeros(count);
     let mut normal = DMatrix::identity(count, count);
+    let distance = |moves: &DVector<f64>| {
+        laps.distance(
+            &left_of(columns, target, moves),
+            &wider(columns, moves, recordings),
+        )
+    };
     for _ in 0..30 {
         let left = left_of(columns, target, &moves);
+        let wide = wider(columns, &moves, recordings);
         let slopes: Vec<White> = (columns.iter().zip(moves.iter()))
             .map(|(c, m)| &c.slope + &c.curvature * (2.0 * m))
             .collect();
-        normal = DMatrix::from_fn(count, count, |i, j| slopes[i].dot(&slopes[j]));
+        let sum = |terms: &dyn Fn(usize) -> f64| (0..recordings).map(terms).sum::<f64>();
+        normal = DMatrix::from_fn(count, count, |i, j| {
+            let (a, b) = (&columns[i].widening, &columns[j].widening);
+            slopes[i].dot(&slopes[j]) + sum(&|g| 0.5 * laps.entries[g] * a[g] * b[g])
+        });
         // A number without action stays where it is.
         for (i, freedom) in freedoms.iter().enumerate() {
             normal[(i, i)] += 1e-6 / (freedom.step * freedom.step);
         }
-        let gradient = DVector::from_fn(count, |i, _| slopes[i].dot(&left));
+        let along_scatter = laps.slopes(&left, &wide);
+        let gradient = DVector::from_fn(count, |i, _| {
+            slopes[i].dot(&left) + sum(&|g| columns[i].widening[g] * along_scatter[g])
+        });
         let Some(step) = normal.clone().cholesky().map(|f| f.solve(&gradient)) else {
             break;
         };
+        let before = laps.distance(&left, &wide);
         let mut share = 1.0;
         let mut next = bounded(&moves, &step, share, freedoms);
-        while left_of(columns, target, &next).norm_squared() > left.norm_squared() && share > 1e-3 {
+        while distance(&next) > before && share > 1e-3 {
             share *= 0.5;
             next = bounded(&moves, &step, share, freedoms);
         }
@@ -316,10 +460,41 @@ mod tests {
 
     use super::*;
 
+    /// One recording with so many entries, whose squares what is left does not change.
+    fn laps(entries: f64, square: f64) -> Laps<'static> {
+        Laps {
+            entries: vec![entries],
+            squares: Box::new(move |_| vec![square]),
+        }
+    }
+
     #[test]
     fn without_numbers_nothing_moves() {
-        let (moves, covariance) = nearest(&[], &White::from_element(5, 1.0), &[]);
+        let (moves, covariance) = nearest(&[], &White::from_element(5, 1.0), &[], &laps(5.0, 5.0));
         assert!(moves.is_empty() && covariance.is_empty());
+    }
+
+    #[test]
+    fn a_number_that_widens_the_scatter_moves_until_laps_are_as_wide_as_it() {
+        let column = Column {
+            slope: White::zeros(5),
+            curvature: White::zeros(5),
+            doubt: White::zeros(5),
+            curvature_doubt: White::zeros(5),
+            widening: vec![2.0],
+        };
+        for times in [0.8_f64, 1.0, 1.3, 4.0] {
+            let laps = laps(600.0, 600.0 * times);
+            let (moves, covariance) = nearest(
+                std::slice::from_ref(&column),
+                &White::zeros(5),
+                &[Freedom::shared(0.5)],
+                &laps,
+            );
+            assert!((moves[0] - times.ln() / 2.0).abs() < 1e-5, "{times}: {moves}");
+            // A variance is known to two parts of its square in as many draws.
+            assert!((covariance[(0, 0)] - 2.0 / 600.0 / 4.0).abs() < 1e-6);
+        }
     }
 
     #[test]
@@ -333,6 +508,7 @@ mod tests {
             curvature: White::zeros(ENTRIES),
             doubt: noise(),
             curvature_doubt: White::zeros(ENTRIES),
+            widening: vec![0.0],
         };
         let normal = DMatrix::from_element(1, 1, column.slope.norm_squared());
         let variance = covariance(&[column], normal)[(0, 0)];

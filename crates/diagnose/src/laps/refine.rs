@@ -121,8 +121,8 @@ impl Descent {
             near: None,
             looks: 0,
             holds: false,
-            rests: false,
-            found: freedoms.is_empty(),
+            rests: freedoms.is_empty(),
+            found: false,
             end: None,
             freedoms,
         }
@@ -235,7 +235,7 @@ impl Atlas {
             return Some(self.climbed(descent, &likeliest, full));
         }
         local.sides.clear();
-        let nearest = self.nearest(data, &local.center, &local.scatter, &local.columns, freedoms);
+        let nearest = self.nearest(data, &local.center, &local.scatter, &local.columns, freedoms, &[]);
         let Descent {
             hypothesis,
             mut freedoms,
@@ -330,7 +330,7 @@ impl Atlas {
         let columns: Vec<Column> = (local.columns.iter().zip(moved.iter()))
             .map(|(column, moved)| column.from(*moved))
             .collect();
-        let nearest = self.nearest(data, &center, &local.scatter, &columns, &freedoms);
+        let nearest = self.nearest(data, &center, &local.scatter, &columns, &freedoms, &[]);
         let (gain, score_error) = self.likely_gain(data, &descent.hypothesis, &center, nearest.hoped)?;
         let Nearest { moves, errors, .. } = nearest;
         let found = full && is_settled(&moves, &nearest.covariance, &freedoms);
@@ -476,14 +476,19 @@ impl Atlas {
         /// A program's constants stay what they are while it runs, and an axle in every run: one in twenty that it is not another cause
         /// that changes.
         const CHANGING_CONSTANT: f64 = 3.0;
+        /// What slips more in one moment does not slip less in the next: laps tell that from less slip as little as memory from more.
+        const SWINGING_SLIP: f64 = 3.0;
         let of_part = |part: &Part| {
             let spec = self.probes[part.probe].spec;
+            let swings = spec.name == "slip-memory" && part.mean_size(self) < 0.0;
             let changes = match part.shape {
                 Shape::Constant => false,
                 Shape::ByRun => spec.name == "axle-length",
                 Shape::ByTime => spec.name == "axle-length" || spec.stage == Stage::Decide,
             };
-            self.choice(part.probe) + if changes { CHANGING_CONSTANT } else { 0.0 }
+            self.choice(part.probe)
+                + if changes { CHANGING_CONSTANT } else { 0.0 }
+                + if swings { SWINGING_SLIP } else { 0.0 }
         };
         let parts: f64 = hypothesis.parts.iter().map(of_part).sum();
         price(hypothesis.fitted(self), self.layout.total_laps()) + parts

@@ -98,6 +98,9 @@ pub(super) const ROUNDS_BESIDE: [(Round, f64, f64); 6] = [
 /// The same for hypotheses of many numbers that are linear in what they do.
 const ROUNDS_OF_GROUPS: [(Round, f64, f64); 2] = [(Round::Rough, 30.0, 0.05), (Round::Full, 20.0, 0.015)];
 
+/// The same from where there is hardly any way to go.
+const ROUNDS_FROM_NEAR: [(Round, f64, f64); 2] = [(Round::Full, 30.0, 0.004), (Round::Full, 15.0, 0.004)];
+
 /// Explanations beside which a further effect is sought: the best need not be part of the best with one more.
 pub(super) const BASES: usize = 2;
 
@@ -231,6 +234,20 @@ impl Search<'_> {
             Quadratic::new(squares.sum(), sizes.len() - 1),
             Quadratic::new(trends.sum(), layout.laps.len()),
         ]
+    }
+
+    /// Explanations without either of their effects that may do nothing, tried to the end from where the others are.
+    pub(super) fn without_idle<'f>(&self, best: impl Iterator<Item = &'f Found>) -> Vec<Found> {
+        let mut starts: Vec<Hypothesis> = Vec::new();
+        for found in best {
+            for part in found.hypothesis.idle(&found.errors, self.atlas) {
+                let start = found.hypothesis.without(part);
+                if !starts.iter().any(|other| other.probes() == start.probes()) {
+                    starts.push(start);
+                }
+            }
+        }
+        self.settle(self.descend(starts.iter(), &ROUNDS_FROM_NEAR, f64::NEG_INFINITY))
     }
 
     /// Explanations with what explains best what they leave beside them, tried to the end.
