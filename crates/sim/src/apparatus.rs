@@ -5,9 +5,9 @@ use std::sync::Arc;
 use track::Vec2;
 
 use crate::cast::{Hits, Rays};
-use crate::effects::{Active, Hit, Moment, Stage};
+use crate::effects::{Active, Chain, Hit, Hook, Stage};
 use crate::world::{Geometry, World, altered};
-use crate::{Error, Machine, Pose, Readings, Setting};
+use crate::{Error, Machine, Pose, Setting};
 
 /// The rays that one ray of the beam makes on all eight sensors, in the body frame.
 #[derive(Debug, Clone, Copy)]
@@ -20,7 +20,7 @@ pub(crate) struct Sight {
 #[derive(Debug)]
 pub(crate) struct Apparatus<'w> {
     pub(crate) world: &'w World<'w>,
-    pub(crate) effects: Vec<Active>,
+    pub(crate) effects: Chain,
     pub(crate) machine: Machine,
     pub(crate) sights: Vec<Sight>,
     pub(crate) geometry: Arc<Geometry>,
@@ -41,18 +41,19 @@ impl<'w> Apparatus<'w> {
     pub(crate) fn new(world: &'w World<'w>, further: &[Setting]) -> Result<Self, Error> {
         let own = &world.model.effects;
         let settings: Vec<Setting> = own.iter().chain(further).cloned().collect();
-        let effects = Active::all(&settings, world.run)?;
-        let machine = altered(&world.model.machine, &effects);
+        let effects = Chain::new(Active::all(&settings, world.run)?);
+        let all = effects.all();
+        let machine = altered(&world.model.machine, all);
         Ok(Self {
             world,
             geometry: Arc::clone(&world.geometry),
             sights: sights(&machine),
-            weighs_rays: effects.iter().any(|active| active.effect.weighs_rays()),
             displacing: on_walls(further, world.run)?,
             cutting: on_walls(own, world.run)?,
-            drifting: effects.iter().any(Active::drifts),
-            remade: (effects.iter()).any(|active| active.drifts() && active.effect.on_machine().is_some()),
+            drifting: all.iter().any(Active::drifts),
+            remade: (all.iter()).any(|active| active.drifts() && active.effect.on_machine().is_some()),
             machine,
+            weighs_rays: effects.has(Hook::RayFactor),
             effects,
             steps: 0,
         })
@@ -76,11 +77,11 @@ impl<'w> Apparatus<'w> {
     }
 
     fn drift(&mut self, time_s: f64) {
-        for active in (self.effects.iter_mut()).chain(&mut self.displacing) {
+        for active in (self.effects.all_mut().iter_mut()).chain(&mut self.displacing) {
             active.advance(time_s);
         }
         if self.remade {
-            let machine = altered(&self.world.model.machine, &self.effects);
+            let machine = altered(&self.world.model.machine, self.effects.all());
             if machine.beam != self.machine.beam || machine.mounts != self.machine.mounts {
                 self.sights = sights(&machine);
             }
@@ -103,23 +104,6 @@ impl<'w> Apparatus<'w> {
         }
     }
 
-    /// Where the camera sees the robot, before its noise, m.
-    #[inline]
-    pub(crate) fn observed(&self, now: &Moment) -> Vec2 {
-        let see = |position, active: &Active| active.effect.observed(&active.values, now, position);
-        self.effects.iter().fold(now.pose.position, see)
-    }
-
-    /// What effects make of the readings, before noise.
-    #[inline]
-    pub(crate) fn change_readings(&mut self, now: &Moment, readings: &mut Readings) {
-        for active in &mut self.effects {
-            active
-                .effect
-                .readings(&active.values, now, &self.machine, readings);
-        }
-    }
-
     /// The rays of a sight from a pose and what they hit.
     #[inline]
     pub(crate) fn cast(&self, pose: Pose, sight: &Sight) -> (Rays, Hits) {
@@ -131,14 +115,7 @@ impl<'w> Apparatus<'w> {
 
     /// What the effects make of one ray's response.
     pub(crate) fn ray_factor(&self, rays: &Rays, hits: &Hits, lane: usize) -> f64 {
-        self.factor_of(&self.hit(rays, hits, lane).0)
-    }
-
-    /// What the effects make of the response to a hit.
-    pub(crate) fn factor_of(&self, hit: &Hit) -> f64 {
-        (self.effects.iter())
-            .map(|active| active.effect.ray_factor(&active.values, hit))
-            .product()
+        self.effects.ray_factor(&self.hit(rays, hits, lane).0)
     }
 
     /// Where one ray met a wall, and the ray's direction along the wall's normal.

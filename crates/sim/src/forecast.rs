@@ -6,7 +6,7 @@ use track::Vec2;
 
 use crate::apparatus::Apparatus;
 use crate::cast::LANES;
-use crate::effects::{Active, Moment};
+use crate::effects::{Active, Chain, Hook, Moment};
 use crate::outlook::{Look, Outlook};
 use crate::world::World;
 use crate::{Error, Machine, Pose, ReadingNoise, Readings, Setting, WheelSpeeds};
@@ -112,7 +112,7 @@ impl<'w> Forecast<'w> {
 
     /// Notes in what the readings differ from another world's.
     fn compare(&mut self, other: &World<'_>) -> Result<(), Error> {
-        let weighs = |active: &Active| active.effect.weighs_rays();
+        let weighs = |active: &Active| active.effect.hooks().contains(&Hook::RayFactor);
         let others = Active::all(&other.model.effects, other.run)?;
         let (mine, theirs) = (&self.apparatus.machine, &other.machine);
         let rays = self.apparatus.moves()
@@ -152,7 +152,8 @@ impl<'w> Forecast<'w> {
 
     /// Where the camera sees a pose, before its noise, m.
     pub fn observed(&self, pose: Pose) -> Vec2 {
-        self.apparatus.observed(&Moment { pose, ..self.now })
+        let now = Moment { pose, ..self.now };
+        self.apparatus.effects.observed(&now, pose.position)
     }
 
     /// Expected readings at a pose with this covariance, to second order in the distance.
@@ -202,7 +203,8 @@ impl<'w> Forecast<'w> {
             step_s: self.apparatus.world.rules().control_step_s,
             ..self.now
         };
-        self.apparatus.change_readings(&now, readings);
+        let machine = &self.apparatus.machine;
+        self.apparatus.effects.readings(&now, machine, readings);
     }
 
     /// The motion of one control step without slip, and the covariance that slip adds.
@@ -252,10 +254,8 @@ impl<'w> Forecast<'w> {
             now.time_s = start_s + f64::from(k) * step_s;
             now.pose = at;
             let ground = self.ground(&now);
-            let mut twist = self.apparatus.machine.robot.twist(ground);
-            for active in &mut self.apparatus.effects {
-                twist = active.effect.twist(&active.values, &now, twist);
-            }
+            let rolling = self.apparatus.machine.robot.twist(ground);
+            let twist = self.apparatus.effects.twist(&now, rolling);
             let next = at.advance(twist, step_s);
             each(
                 Pose {
@@ -264,12 +264,7 @@ impl<'w> Forecast<'w> {
                 },
                 ground,
             );
-            let drift: Vec2 = self
-                .apparatus
-                .effects
-                .iter()
-                .map(|active| active.effect.drift_m_s(&active.values, &now) * step_s)
-                .sum();
+            let drift = self.apparatus.effects.drifted(&now, Vec2::ZERO, step_s);
             at = Pose {
                 position: next.position + drift,
                 ..next
@@ -281,14 +276,9 @@ impl<'w> Forecast<'w> {
 
     /// Speeds of the wheels over the ground without slip.
     fn ground(&mut self, now: &Moment) -> WheelSpeeds {
-        let mut wheels = now.command;
-        for active in &mut self.apparatus.effects {
-            wheels = active.effect.drive(&active.values, now, wheels);
-        }
-        for active in &mut self.apparatus.effects {
-            wheels = active.effect.ground(&active.values, now, wheels);
-        }
-        wheels
+        let effects = &mut self.apparatus.effects;
+        let wheels = effects.drive(now, now.command);
+        effects.ground(now, wheels)
     }
 
     /// What uniform slip of each wheel in each physics step adds up to at the step's end.
@@ -316,18 +306,15 @@ impl<'w> Forecast<'w> {
     /// readings are straight lines in them, so one difference from a second chain of effects, at its second reading, is exact.
     fn passage(&self) -> Result<(Option<Passage>, f64), Error> {
         let second = |raised: Option<(usize, usize)>| -> Result<Readings, Error> {
-            let mut effects = Active::all(&self.apparatus.world.model.effects, self.apparatus.world.run)?;
+            let world = self.apparatus.world;
+            let mut effects = Chain::new(Active::all(&world.model.effects, world.run)?);
             let mut readings = [100.0; LANES];
             for step in 0..2 {
                 readings = [100.0; LANES];
                 if let Some((_, lane)) = raised.filter(|(when, _)| *when == step) {
                     readings[lane] += 1.0;
                 }
-                for active in &mut effects {
-                    active
-                        .effect
-                        .readings(&active.values, &self.now, &self.apparatus.machine, &mut readings);
-                }
+                effects.readings(&self.now, &self.apparatus.machine, &mut readings);
             }
             Ok(readings)
         };

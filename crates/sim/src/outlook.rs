@@ -172,7 +172,7 @@ impl Apparatus<'_> {
             .sum();
         (
             hit.distance_m + moved_m / not_grazing(towards),
-            self.factor_of(&hit),
+            self.effects.ray_factor(&hit),
         )
     }
 

@@ -4,6 +4,8 @@ use track::{Lap, LapTracker, Vec2, Way};
 
 use crate::apparatus::Apparatus;
 use crate::cast::LANES;
+#[cfg(test)]
+use crate::effects::Hook;
 use crate::effects::Moment;
 use crate::noise::{Stream, Streams};
 use crate::sensor::Combine;
@@ -108,6 +110,13 @@ impl<'w> Run<'w> {
         self.contacts
     }
 
+    /// Has every hook of every effect called from now on.
+    #[cfg(test)]
+    pub(crate) fn call_every_hook(&mut self) {
+        self.apparatus.effects.call_every_hook();
+        self.apparatus.weighs_rays = self.apparatus.effects.has(Hook::RayFactor);
+    }
+
     /// Drives for one control step.
     pub fn step(&mut self) -> Step {
         let time_s = self.start_s + self.steps as f64 * self.apparatus.world.rules().control_step_s;
@@ -142,7 +151,7 @@ impl<'w> Run<'w> {
     /// Where the camera sees the robot.
     #[inline]
     fn observe(&mut self, now: &Moment) -> Vec2 {
-        let seen = self.apparatus.observed(now);
+        let seen = self.apparatus.effects.observed(now, now.pose.position);
         let noise_m = self.apparatus.machine.camera_noise_m;
         let (x, y) = (self.camera.normal(), self.camera.normal());
         seen + Vec2::new(x, y) * noise_m
@@ -154,15 +163,13 @@ impl<'w> Run<'w> {
         // Drawn first: the processor casts the rays meanwhile.
         let normals: Readings = std::array::from_fn(|_| self.sense.normal());
         let mut readings = self.responses();
-        self.apparatus.change_readings(now, &mut readings);
-        let noise = self.apparatus.machine.noise;
+        let machine = &self.apparatus.machine;
+        self.apparatus.effects.readings(now, machine, &mut readings);
+        let (noise, full_scale) = (machine.noise, machine.full_scale_counts);
         for (reading, normal) in readings.iter_mut().zip(normals) {
             *reading += noise.deviation(*reading) * normal;
         }
-        for active in &mut self.apparatus.effects {
-            active.effect.noisy_readings(&active.values, &mut readings);
-        }
-        let full_scale = self.apparatus.machine.full_scale_counts;
+        self.apparatus.effects.noisy_readings(&mut readings);
         readings.map(|reading| reading.clamp(0.0, full_scale))
     }
 
@@ -235,14 +242,10 @@ impl<'w> Run<'w> {
             now.time_s = start_s + f64::from(k) * step_s;
             now.pose = self.pose;
             let ground = self.ground(&now);
-            let mut twist = self.apparatus.machine.robot.twist(ground);
-            for active in &mut self.apparatus.effects {
-                twist = active.effect.twist(&active.values, &now, twist);
-            }
+            let rolling = self.apparatus.machine.robot.twist(ground);
+            let twist = self.apparatus.effects.twist(&now, rolling);
             self.pose = self.pose.advance(twist, step_s);
-            for active in &self.apparatus.effects {
-                self.pose.position += active.effect.drift_m_s(&active.values, &now) * step_s;
-            }
+            self.pose.position = (self.apparatus.effects).drifted(&now, self.pose.position, step_s);
             self.touch();
             self.pass_gate();
         }
@@ -251,21 +254,15 @@ impl<'w> Run<'w> {
     /// Speeds of the wheels over the ground.
     #[inline]
     fn ground(&mut self, now: &Moment) -> WheelSpeeds {
-        let mut wheels = now.command;
-        let mut draws = [self.slip.symmetric(), self.slip.symmetric()];
-        for active in &mut self.apparatus.effects {
-            wheels = active.effect.drive(&active.values, now, wheels);
-            draws = active.effect.slip(&active.values, draws);
-        }
+        let effects = &mut self.apparatus.effects;
+        let wheels = effects.drive(now, now.command);
+        let draws = effects.slip([self.slip.symmetric(), self.slip.symmetric()]);
         let level = self.apparatus.machine.slip_level;
-        let mut ground = WheelSpeeds {
+        let slipping = WheelSpeeds {
             left_m_s: wheels.left_m_s * (1.0 + level * draws[0]),
             right_m_s: wheels.right_m_s * (1.0 + level * draws[1]),
         };
-        for active in &mut self.apparatus.effects {
-            ground = active.effect.ground(&active.values, now, ground);
-        }
-        ground
+        effects.ground(now, slipping)
     }
 
     /// Moves the centre away from walls that the body overlaps; the heading stays.

@@ -6,7 +6,7 @@ use track::Vec2;
 
 use super::plain::{OnDrift, OnDrive, OnGround, OnMachine, OnYaw};
 use super::sense::{decay, rounded};
-use super::{Effect, Moment, Param, Spec, Stage};
+use super::{Effect, Hook, Moment, Param, Spec, Stage};
 use crate::WheelSpeeds;
 
 /// The longest delay, s.
@@ -27,6 +27,9 @@ pub(super) const COMMAND_DELAY: Spec = Spec {
 struct CommandDelay(VecDeque<WheelSpeeds>);
 
 impl Effect for CommandDelay {
+    fn hooks(&self) -> &'static [Hook] {
+        &[Hook::Drive]
+    }
     fn drive(&mut self, values: &[f64], now: &Moment, wheels: WheelSpeeds) -> WheelSpeeds {
         let steps = |time_s: f64| (time_s / now.step_s).round() as usize;
         // All that the longest delay may ask for is kept, because a delay may grow during a run.
@@ -75,6 +78,9 @@ pub(super) const MOTOR_LAG: Spec = Spec {
 struct MotorLag(WheelSpeeds);
 
 impl Effect for MotorLag {
+    fn hooks(&self) -> &'static [Hook] {
+        &[Hook::Drive]
+    }
     fn drive(&mut self, values: &[f64], now: &Moment, wheels: WheelSpeeds) -> WheelSpeeds {
         let decay = decay(now.step_s, values[0]);
         self.0 = both(wheels, self.0, |target, before| {
@@ -99,6 +105,9 @@ pub(super) const ACCELERATION_LIMIT: Spec = Spec {
 struct AccelerationLimit(WheelSpeeds);
 
 impl Effect for AccelerationLimit {
+    fn hooks(&self) -> &'static [Hook] {
+        &[Hook::Drive]
+    }
     fn drive(&mut self, values: &[f64], now: &Moment, wheels: WheelSpeeds) -> WheelSpeeds {
         let most = values[0] * now.step_s;
         self.0 = both(wheels, self.0, |target, before| {
@@ -141,6 +150,9 @@ pub(super) const SLIP_MEMORY: Spec = Spec {
 struct SlipMemory(Option<[f64; 2]>);
 
 impl Effect for SlipMemory {
+    fn hooks(&self) -> &'static [Hook] {
+        &[Hook::Slip]
+    }
     fn slip(&mut self, values: &[f64], draws: [f64; 2]) -> [f64; 2] {
         let correlation = values[0];
         let fresh = (1.0 - correlation * correlation).sqrt();

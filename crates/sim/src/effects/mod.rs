@@ -5,6 +5,7 @@
 //! the robot.
 
 mod act;
+mod chain;
 mod decide;
 mod observe;
 mod plain;
@@ -22,6 +23,7 @@ use std::fmt::Debug;
 
 use track::Vec2;
 
+pub(crate) use chain::Chain;
 pub(crate) use setting::Active;
 pub use setting::{Pattern, Setting};
 pub use unlisted::{UNLISTED, unlisted_at, unlisted_on_floor};
@@ -263,9 +265,51 @@ pub struct Hit {
     pub site: Site,
 }
 
+/// A place in the tick where an effect may act: one of the methods of [`Effect`] that are called while a robot drives.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Hook {
+    /// [`Effect::ray_factor`].
+    RayFactor,
+    /// [`Effect::readings`].
+    Readings,
+    /// [`Effect::noisy_readings`].
+    NoisyReadings,
+    /// [`Effect::drive`].
+    Drive,
+    /// [`Effect::slip`].
+    Slip,
+    /// [`Effect::ground`].
+    Ground,
+    /// [`Effect::twist`].
+    Twist,
+    /// [`Effect::drift_m_s`].
+    Drift,
+    /// [`Effect::observed`].
+    Observed,
+}
+
+impl Hook {
+    /// All of them, in the order of their numbers.
+    pub const ALL: [Self; 9] = [
+        Self::RayFactor,
+        Self::Readings,
+        Self::NoisyReadings,
+        Self::Drive,
+        Self::Slip,
+        Self::Ground,
+        Self::Twist,
+        Self::Drift,
+        Self::Observed,
+    ];
+}
+
 /// Hooks into the tick. Each gets the values of the effect's parameters in the order of its [`Spec`]; each does
 /// nothing unless an effect says otherwise.
 pub trait Effect: Debug + Send {
+    /// Those of the hooks called while a robot drives that it has; the others are not called. All, unless it says otherwise.
+    fn hooks(&self) -> &'static [Hook] {
+        &Hook::ALL
+    }
     /// What changes constants of the machine, if anything does.
     fn on_machine(&self) -> Option<fn(&[f64], &mut Machine)> {
         None
@@ -278,13 +322,9 @@ pub trait Effect: Debug + Send {
     fn divides(&self, _values: &[f64], _from: &Site, _to: &Site) -> bool {
         false
     }
-    /// Factor on the response of one ray; asked only where [`Effect::weighs_rays`] says so.
+    /// Factor on the response of one ray.
     fn ray_factor(&self, _values: &[f64], _hit: &Hit) -> f64 {
         1.0
-    }
-    /// Whether [`Effect::ray_factor`] must be asked.
-    fn weighs_rays(&self) -> bool {
-        false
     }
     /// Changes the readings before noise.
     fn readings(&mut self, _values: &[f64], _now: &Moment, _machine: &Machine, _readings: &mut Readings) {}

@@ -2,7 +2,7 @@
 
 use track::Vec2;
 
-use super::{Effect, Hit, Moment};
+use super::{Effect, Hit, Hook, Moment};
 use crate::{Machine, Readings, Twist, WheelSpeeds};
 
 /// Changes constants of the machine.
@@ -10,6 +10,9 @@ use crate::{Machine, Readings, Twist, WheelSpeeds};
 pub(super) struct OnMachine(pub(super) fn(&[f64], &mut Machine));
 
 impl Effect for OnMachine {
+    fn hooks(&self) -> &'static [Hook] {
+        &[]
+    }
     fn on_machine(&self) -> Option<fn(&[f64], &mut Machine)> {
         Some(self.0)
     }
@@ -20,6 +23,9 @@ impl Effect for OnMachine {
 pub(super) struct OnReadings(pub(super) fn(&[f64], &Moment, &mut Readings));
 
 impl Effect for OnReadings {
+    fn hooks(&self) -> &'static [Hook] {
+        &[Hook::Readings]
+    }
     fn readings(&mut self, values: &[f64], now: &Moment, _machine: &Machine, readings: &mut Readings) {
         (self.0)(values, now, readings);
     }
@@ -30,8 +36,8 @@ impl Effect for OnReadings {
 pub(super) struct OnRays(pub(super) fn(&[f64], &Hit) -> f64);
 
 impl Effect for OnRays {
-    fn weighs_rays(&self) -> bool {
-        true
+    fn hooks(&self) -> &'static [Hook] {
+        &[Hook::RayFactor]
     }
     fn ray_factor(&self, values: &[f64], hit: &Hit) -> f64 {
         (self.0)(values, hit)
@@ -43,6 +49,9 @@ impl Effect for OnRays {
 pub(super) struct OnDrive(pub(super) fn(&[f64], f64) -> f64);
 
 impl Effect for OnDrive {
+    fn hooks(&self) -> &'static [Hook] {
+        &[Hook::Drive]
+    }
     fn drive(&mut self, values: &[f64], _now: &Moment, wheels: WheelSpeeds) -> WheelSpeeds {
         wheels.map(|speed| (self.0)(values, speed))
     }
@@ -53,6 +62,9 @@ impl Effect for OnDrive {
 pub(super) struct OnGround(pub(super) fn(&[f64], &Moment, WheelSpeeds) -> WheelSpeeds);
 
 impl Effect for OnGround {
+    fn hooks(&self) -> &'static [Hook] {
+        &[Hook::Ground]
+    }
     fn ground(&mut self, values: &[f64], now: &Moment, wheels: WheelSpeeds) -> WheelSpeeds {
         (self.0)(values, now, wheels)
     }
@@ -63,6 +75,9 @@ impl Effect for OnGround {
 pub(super) struct OnYaw(pub(super) fn(&[f64], f64) -> f64);
 
 impl Effect for OnYaw {
+    fn hooks(&self) -> &'static [Hook] {
+        &[Hook::Twist]
+    }
     fn twist(&mut self, values: &[f64], _now: &Moment, twist: Twist) -> Twist {
         let yaw_rad_s = (self.0)(values, twist.yaw_rad_s);
         Twist { yaw_rad_s, ..twist }
@@ -74,6 +89,9 @@ impl Effect for OnYaw {
 pub(super) struct OnDrift(pub(super) fn(&[f64]) -> Vec2);
 
 impl Effect for OnDrift {
+    fn hooks(&self) -> &'static [Hook] {
+        &[Hook::Drift]
+    }
     fn drift_m_s(&self, values: &[f64], _now: &Moment) -> Vec2 {
         (self.0)(values)
     }
@@ -84,6 +102,9 @@ impl Effect for OnDrift {
 pub(super) struct OnCamera(pub(super) fn(&[f64], &Moment, Vec2) -> Vec2);
 
 impl Effect for OnCamera {
+    fn hooks(&self) -> &'static [Hook] {
+        &[Hook::Observed]
+    }
     fn observed(&self, values: &[f64], now: &Moment, position: Vec2) -> Vec2 {
         position + (self.0)(values, now, position)
     }

@@ -1,7 +1,7 @@
 //! Effects on readings: gains, offsets, crosstalk, lag, noise and rounding.
 
 use super::plain::{OnMachine, OnReadings};
-use super::{Effect, Moment, Param, Spec, Stage};
+use super::{Effect, Hook, Moment, Param, Spec, Stage};
 use crate::{Machine, Readings};
 
 /// Which of S0 to S7.
@@ -100,6 +100,9 @@ pub(super) const DIRECTIONAL_LIGHT: Spec = Spec {
 struct DirectionalLight;
 
 impl Effect for DirectionalLight {
+    fn hooks(&self) -> &'static [Hook] {
+        &[Hook::Readings]
+    }
     fn readings(&mut self, values: &[f64], now: &Moment, machine: &Machine, readings: &mut Readings) {
         let azimuth_rad = values[1] - now.pose.heading_rad(); // in the body frame
         for (reading, mount) in readings.iter_mut().zip(&machine.mounts) {
@@ -141,6 +144,9 @@ pub(super) const SENSOR_LAG: Spec = Spec {
 struct SensorLag(Option<Readings>);
 
 impl Effect for SensorLag {
+    fn hooks(&self) -> &'static [Hook] {
+        &[Hook::Readings]
+    }
     fn readings(&mut self, values: &[f64], now: &Moment, _machine: &Machine, readings: &mut Readings) {
         let decay = decay(now.step_s, values[0]);
         let past = self.0.unwrap_or(*readings);
@@ -189,6 +195,9 @@ pub(super) const READING_STEP: Spec = Spec {
 struct ReadingStep;
 
 impl Effect for ReadingStep {
+    fn hooks(&self) -> &'static [Hook] {
+        &[Hook::NoisyReadings]
+    }
     fn noisy_readings(&mut self, values: &[f64], readings: &mut Readings) {
         readings
             .iter_mut()

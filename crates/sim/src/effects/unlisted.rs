@@ -2,7 +2,7 @@
 
 use track::Vec2;
 
-use super::{Effect, Moment, Param, Spec, Stage};
+use super::{Effect, Hook, Moment, Param, Spec, Stage};
 use crate::{Machine, Readings, Twist, WheelSpeeds};
 
 const ACTS_ON: [&str; 10] = [
@@ -147,6 +147,15 @@ fn on_floor(coefficients: &[f64], at: Vec2) -> f64 {
 }
 
 impl Effect for Unlisted {
+    fn hooks(&self) -> &'static [Hook] {
+        &[
+            Hook::Readings,
+            Hook::Ground,
+            Hook::Twist,
+            Hook::Drift,
+            Hook::Observed,
+        ]
+    }
     fn readings(&mut self, values: &[f64], now: &Moment, _machine: &Machine, readings: &mut Readings) {
         if let Some(share) = amount(values, now, self.mean_rad(), &["reading"]) {
             readings.iter_mut().for_each(|reading| *reading *= 1.0 + share);

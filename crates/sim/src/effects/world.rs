@@ -2,7 +2,7 @@
 
 use track::Side;
 
-use super::{Effect, Param, Site, Spec, Stage};
+use super::{Effect, Hook, Param, Site, Spec, Stage};
 
 /// One of the two walls.
 pub(super) const WALLS: Param = Param::choice("wall", &["outer", "inner"]);
@@ -41,6 +41,9 @@ pub(super) const INNER_WALL_OFFSET: Spec = Spec {
 struct WallOffset(Side);
 
 impl Effect for WallOffset {
+    fn hooks(&self) -> &'static [Hook] {
+        &[]
+    }
     fn displacement_m(&self, values: &[f64], at: &Site) -> f64 {
         if at.place.side == self.0 {
             at.outward * values[0]
@@ -72,6 +75,9 @@ const REACH: f64 = 3.0;
 struct WallBump;
 
 impl Effect for WallBump {
+    fn hooks(&self) -> &'static [Hook] {
+        &[]
+    }
     fn displacement_m(&self, values: &[f64], at: &Site) -> f64 {
         let [wall, position, height_m, length_m] = [0, 1, 2, 3].map(|i| values[i]);
         if is_wall(wall, at.place.side) {
