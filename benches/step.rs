@@ -39,6 +39,26 @@ fn main() {
             &wide,
         );
     }
+    let effects: [&[(&str, &[f64])]; 3] = [
+        &[("reading-gain", &[1.02])],
+        &[("slip-level", &[1.5])],
+        &[("sensor-lag", &[0.1]), ("camera-offset", &[0.001, 0.0])],
+    ];
+    for together in effects {
+        let mut with = model(braitenberg(), 0.005);
+        let setting = |&(name, values): &(&str, &[f64])| {
+            let spec = sim::find(name).expect("a name of the registry");
+            Setting::constant(spec, values.to_vec())
+        };
+        with.effects = together.iter().map(setting).collect();
+        let names: Vec<&str> = together.iter().map(|(name, _)| *name).collect();
+        step(
+            &mut criterion,
+            &format!("step/with/{}", names.join("+")),
+            &circuit,
+            &with,
+        );
+    }
     for name in ["reading-gain", "sensor-reach", "outer-wall-offset"] {
         let mut drifting = model(braitenberg(), 0.005);
         drifting.effects.push(by_time(name));

@@ -46,16 +46,31 @@ impl Scan {
     /// The best size, and the squared distance that it leaves; `None` where no size explains a fair share of what the base
     /// leaves.
     fn best(&self, base: &Base, chance: f64) -> Option<(f64, Hunt)> {
+        self.bottoms(base, chance).into_iter().next()
+    }
+
+    /// The best of the sizes that leave less than their neighbours, and the squared distances that they leave; none that explain less
+    /// than a fair share of what the base leaves.
+    fn bottoms(&self, base: &Base, chance: f64) -> Vec<(f64, Hunt)> {
         const FAIR_SHARE: f64 = 0.25;
-        let squares = self.looks.iter().map(|look| (look.square(), look.size));
-        let (left, size) = squares.min_by(|a, b| a.0.total_cmp(&b.0))?;
-        let fair = left - chance < (1.0 - FAIR_SHARE) * self.excess;
-        fair.then(|| {
+        const MOST: usize = 3;
+        let squares: Vec<f64> = self.looks.iter().map(Look::square).collect();
+        let is_bottom = |&i: &usize| {
+            let before = i.checked_sub(1).map(|before| squares[before]);
+            let beside = before.iter().chain(squares.get(i + 1));
+            beside.into_iter().all(|beside| squares[i] <= *beside)
+        };
+        let is_fair = |&i: &usize| squares[i] - chance < (1.0 - FAIR_SHARE) * self.excess;
+        let mut bottoms: Vec<usize> = (0..squares.len()).filter(is_bottom).filter(is_fair).collect();
+        bottoms.sort_by(|&a, &b| squares[a].total_cmp(&squares[b]));
+        let hunt = |i: usize| {
+            let size = self.looks[i].size;
             (
-                left,
+                squares[i],
                 Hunt::new(base.clone(), self.probe, size, self.spacing(size)),
             )
-        })
+        };
+        bottoms.into_iter().take(MOST).map(hunt).collect()
     }
 
     /// How far off a size may be.
@@ -169,7 +184,13 @@ impl Search<'_> {
                 "closer sizes of {}",
                 self.atlas.probes[scan.probe].spec.name
             ));
-            let (_, hunt) = scan.best(&nothing, self.chance())?;
+            // Where a reading or a speed is so many steps, one more or one less does nearly the same.
+            let bottoms = scan.bottoms(&nothing, self.chance());
+            let mut closer: Vec<(f64, Hunt)> = (bottoms.into_iter())
+                .filter_map(|(_, hunt)| self.atlas.hunted_once(self.simulate, self.data, hunt))
+                .collect();
+            closer.sort_by(|a, b| a.0.total_cmp(&b.0));
+            let (_, hunt) = closer.into_iter().next()?;
             let found = self.atlas.hunted(self.simulate, self.data, &hunt)?;
             let end = Descent::start(self.atlas, &found);
             let settled = self.atlas.settle(self.simulate, self.data, &end)?;
