@@ -302,7 +302,7 @@ impl Study {
     }
 
     /// For each draw one run of each variant with effects added to the model, which act as in measured run `run`; `None`
-    /// where fewer than two laps are closed, the fewest that a distance can be told of.
+    /// where fewer than three laps are closed, the fewest that vary in two modes.
     ///
     /// The random streams are those of the study's own runs, so that draws differ by the effects alone.
     ///
@@ -316,6 +316,7 @@ impl Study {
         variants: &[Variant],
         progress: &Progress,
     ) -> Result<Vec<Vec<Option<Cluster>>>> {
+        const FEWEST: usize = 3;
         let setup = |variant: &Variant| -> Result<Setup> {
             let mut setup = variant.setup(&self.standard, &self.measured.circuit)?;
             setup.model.effects.extend_from_slice(effects);
@@ -333,7 +334,9 @@ impl Study {
             let drive = sim::drive(&scene.world(model, run)?, streams, self.laps, |_| {})?;
             progress.tick(1);
             let run = laps::simulated(name, 0, &drive, self.laps);
-            (run.laps.len() > 1).then(|| lap_cluster(name, &run)).transpose()
+            (run.laps.len() >= FEWEST)
+                .then(|| lap_cluster(name, &run))
+                .transpose()
         };
         (0..self.draws.len())
             .into_par_iter()

@@ -36,15 +36,15 @@ pub(crate) struct BeforeAfter {
 #[derive(Debug)]
 struct Change {
     before: Estimate,
-    /// Over the draws in which the robot closes two laps; `None` without any.
+    /// Over the draws in which the robot closes three laps; `None` without any.
     after: Option<Estimate>,
     /// In how many of these it got closer.
     closer: Tally,
-    /// Draws in which the robot closes fewer than two laps.
+    /// Draws in which the robot closes fewer than three laps.
     stuck: usize,
 }
 
-/// Distances (eq. 8) by draw, simulation and measured run; `None` for a simulation without two laps.
+/// Distances (eq. 8) by draw, simulation and measured run; `None` for a simulation without three laps.
 type ByDraw = Vec<Vec<Option<Vec<f64>>>>;
 
 /// Number of runs that [`tables`] simulates in each draw.
@@ -179,7 +179,7 @@ impl Change {
             draws,
         };
         match (draws, self.closer.holds(), farther.holds()) {
-            (0, ..) => "closes fewer than two laps",
+            (0, ..) => "closes fewer than three laps",
             (_, true, _) => "closer",
             (_, _, true) => "farther",
             _ => "neither closer nor farther",
@@ -189,12 +189,12 @@ impl Change {
     fn sentence(&self, name: &str) -> String {
         let all = self.stuck + self.closer.draws;
         let Some(after) = self.after else {
-            return format!("{name} closes fewer than two laps in {all} draws");
+            return format!("{name} closes fewer than three laps in {all} draws");
         };
         let (before, after, closer) = (self.before.mean, after.mean, &self.closer);
         let stuck = match self.stuck {
             0 => String::new(),
-            stuck => format!("; {stuck} of {all} draws close fewer than two laps and are left out"),
+            stuck => format!("; {stuck} of {all} draws close fewer than three laps and are left out"),
         };
         format!(
             "{name} {} ({before:.1} to {after:.1}, closer in {closer}{stuck})",
@@ -206,7 +206,7 @@ impl Change {
         json!({
             "simulation": key, "change": self.word(),
             "before": self.before.json("distance"), "after": self.after.map(|after| after.json("distance")),
-            "closer_in_draws": self.closer.times, "draws": self.closer.draws, "draws_without_two_laps": self.stuck,
+            "closer_in_draws": self.closer.times, "draws": self.closer.draws, "draws_without_three_laps": self.stuck,
         })
     }
 }
@@ -234,7 +234,7 @@ impl BeforeAfter {
         )
     }
 
-    /// `[{"simulation", "change", "before", "after", "closer_in_draws", "draws", "draws_without_two_laps"}]`.
+    /// `[{"simulation", "change", "before", "after", "closer_in_draws", "draws", "draws_without_three_laps"}]`.
     pub(crate) fn changes_json(&self) -> Value {
         self.changes()
             .map(|(row, change)| change.json(&row.key))
@@ -264,22 +264,22 @@ mod tests {
     }
 
     #[test]
-    fn draws_without_two_laps_are_counted_and_left_out() {
+    fn draws_without_three_laps_are_counted_and_left_out() {
         let draw = |distance: Option<f64>| vec![distance.map(|d| vec![d, d + 2.0])];
         let before = vec![draw(Some(4.0)), draw(Some(6.0))];
         let change = Change::new(&before, &vec![draw(None), draw(Some(1.0))], 0);
         assert_eq!(
             change.sentence("coarse"),
-            "coarse closer (6.0 to 2.0, closer in 1 of 1 draws; 1 of 2 draws close fewer than two laps and are left out)"
+            "coarse closer (6.0 to 2.0, closer in 1 of 1 draws; 1 of 2 draws close fewer than three laps and are left out)"
         );
         let stuck = Change::new(&before, &vec![draw(None), draw(None)], 0);
         assert_eq!(
             stuck.sentence("coarse"),
-            "coarse closes fewer than two laps in 2 draws"
+            "coarse closes fewer than three laps in 2 draws"
         );
         assert_eq!(
             (stuck.word(), stuck.json("k")["after"].is_null()),
-            ("closes fewer than two laps", true)
+            ("closes fewer than three laps", true)
         );
     }
 }
