@@ -266,8 +266,8 @@ fn explain(search: &Search<'_>, mut found: Vec<Found>) -> Vec<Found> {
     held_still(search, simplified(search, found))
 }
 
-/// Explanations of which the first, if it claims several effects, needs each of them: one that may do nothing has stood for sizes of the
-/// others that were not the best ones yet.
+/// Explanations of which the first, if it claims several effects, needs each of them and each of their patterns: an effect that may do
+/// nothing has stood for sizes of the others that were not the best ones yet.
 fn simplified(search: &Search<'_>, found: Vec<Found>) -> Vec<Found> {
     let Some(best) = found.first().map(|best| &best.explanation) else {
         return found;
@@ -276,7 +276,7 @@ fn simplified(search: &Search<'_>, found: Vec<Found>) -> Vec<Found> {
         return found;
     }
     let rivals = indistinguishable(found.iter().map(|found| &found.explanation), ALTERNATIVE);
-    let mut fewer = search.without_idle(found[..rivals].iter());
+    let mut fewer = search.simpler(found[..rivals].iter());
     if fewer.is_empty() {
         return found;
     }

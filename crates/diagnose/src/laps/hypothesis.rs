@@ -387,12 +387,8 @@ impl Hypothesis {
         if patterned.len() < 2 {
             return Vec::new();
         }
-        let without = |part: usize| {
-            let mut parts = self.parts.clone();
-            parts[part] = parts[part].plain(atlas);
-            Self { parts }
-        };
-        patterned.into_iter().map(without).collect()
+        let with_one_size = |part| self.with_one_size(part, atlas);
+        patterned.into_iter().map(with_one_size).collect()
     }
 
     /// The same with the mean size of every effect whose size goes over the runs or in time; `None` if none does.
@@ -404,28 +400,56 @@ impl Hypothesis {
 
     /// Whether sizes that go over the runs, or in time, do so by more than chance, by their errors.
     pub(super) fn patterns_show(&self, errors: &[(Freedom, f64)]) -> bool {
+        (0..self.parts.len()).all(|part| self.pattern_shows(part, errors))
+    }
+
+    fn pattern_shows(&self, part: usize, errors: &[(Freedom, f64)]) -> bool {
         const CHANCE: f64 = 0.01;
-        let shows = |(number, part): (usize, &Part)| {
-            let numbers = |are: fn(&Freedom) -> bool| -> Vec<(f64, f64)> {
-                let own = errors.iter().filter(|(f, _)| f.part == number && are(f));
-                own.map(|(f, error)| (self.get(f), *error)).collect()
-            };
-            let p = match part.shape {
-                Shape::Constant => 0.0,
-                Shape::ByRun => differ(&numbers(|f| f.run.is_some())).p,
-                Shape::ByTime => {
-                    let changes = numbers(|f| f.parameter.is_none());
-                    let squares = changes.iter().map(|(change, error)| (change / error).powi(2));
-                    Quadratic::new(squares.sum(), 1).p
-                }
-            };
-            p < CHANCE
+        let numbers = |are: fn(&Freedom) -> bool| -> Vec<(f64, f64)> {
+            let own = errors.iter().filter(|(f, _)| f.part == part && are(f));
+            own.map(|(f, error)| (self.get(f), *error)).collect()
         };
-        self.parts.iter().enumerate().all(shows)
+        let p = match self.parts[part].shape {
+            Shape::Constant => 0.0,
+            Shape::ByRun => differ(&numbers(|f| f.run.is_some())).p,
+            Shape::ByTime => {
+                let changes = numbers(|f| f.parameter.is_none());
+                let squares = changes.iter().map(|(change, error)| (change / error).powi(2));
+                Quadratic::new(squares.sum(), 1).p
+            }
+        };
+        p < CHANCE
+    }
+
+    /// The same without each of its effects that may do nothing, and with one size of each whose sizes may be the same always.
+    pub(super) fn simpler(&self, errors: &[(Freedom, f64)], atlas: &Atlas) -> Vec<Self> {
+        let idle = self
+            .idle(errors, atlas)
+            .into_iter()
+            .map(|part| self.without(part));
+        let steady = (0..self.parts.len()).filter(|&part| !self.pattern_shows(part, errors));
+        idle.chain(steady.map(|part| self.with_one_size(part, atlas)))
+            .collect()
+    }
+
+    /// The same with one of its effects at its mean size.
+    fn with_one_size(&self, part: usize, atlas: &Atlas) -> Self {
+        let mut parts = self.parts.clone();
+        parts[part] = parts[part].plain(atlas);
+        Self { parts }
+    }
+
+    /// Whether it has another's effects in the same patterns.
+    pub(super) fn has_patterns_of(&self, other: &Self) -> bool {
+        let has = |part: &Part| {
+            let mut own = self.parts.iter();
+            own.any(|own| own.probe == part.probe && own.shape == part.shape)
+        };
+        self.parts.len() == other.parts.len() && other.parts.iter().all(has)
     }
 
     /// Its constant effects whose sizes are so few errors from doing nothing that they may do it.
-    pub(super) fn idle(&self, errors: &[(Freedom, f64)], atlas: &Atlas) -> Vec<usize> {
+    fn idle(&self, errors: &[(Freedom, f64)], atlas: &Atlas) -> Vec<usize> {
         const ERRORS: f64 = 6.0;
         let is_idle = |&number: &usize| {
             let part = &self.parts[number];

@@ -55,14 +55,7 @@ impl Scan {
         const FAIR_SHARE: f64 = 0.25;
         const MOST: usize = 3;
         let squares: Vec<f64> = self.looks.iter().map(Look::square).collect();
-        let is_bottom = |&i: &usize| {
-            let before = i.checked_sub(1).map(|before| squares[before]);
-            let beside = before.iter().chain(squares.get(i + 1));
-            beside.into_iter().all(|beside| squares[i] <= *beside)
-        };
         let is_fair = |&i: &usize| squares[i] - chance < (1.0 - FAIR_SHARE) * self.excess;
-        let mut bottoms: Vec<usize> = (0..squares.len()).filter(is_bottom).filter(is_fair).collect();
-        bottoms.sort_by(|&a, &b| squares[a].total_cmp(&squares[b]));
         let hunt = |i: usize| {
             let size = self.looks[i].size;
             (
@@ -70,7 +63,9 @@ impl Scan {
                 Hunt::new(base.clone(), self.probe, size, self.spacing(size)),
             )
         };
-        bottoms.into_iter().take(MOST).map(hunt).collect()
+        (bottoms(&squares).into_iter().filter(is_fair).take(MOST))
+            .map(hunt)
+            .collect()
     }
 
     /// How far off a size may be.
@@ -288,5 +283,29 @@ impl Search<'_> {
 
     fn jumping(&self) -> impl Iterator<Item = usize> {
         (0..self.atlas.probes.len()).filter(|&probe| self.atlas.probes[probe].jumps())
+    }
+}
+
+/// The places of numbers that are not larger than their neighbours, the smallest number first.
+fn bottoms(numbers: &[f64]) -> Vec<usize> {
+    let is_bottom = |&i: &usize| {
+        let before = i.checked_sub(1).map(|before| numbers[before]);
+        let mut beside = before.iter().chain(numbers.get(i + 1));
+        beside.all(|beside| numbers[i] <= *beside)
+    };
+    let mut found: Vec<usize> = (0..numbers.len()).filter(is_bottom).collect();
+    found.sort_by(|&a, &b| numbers[a].total_cmp(&numbers[b]));
+    found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::bottoms;
+
+    #[test]
+    fn bottoms_are_lower_than_their_neighbours_and_may_lie_at_an_end() {
+        assert_eq!(bottoms(&[3.0, 1.0, 2.0, 0.5, 5.0, 4.0]), [3, 1, 5]);
+        assert_eq!(bottoms(&[1.0]), [0]);
+        assert!(bottoms(&[]).is_empty());
     }
 }

@@ -236,13 +236,13 @@ impl Search<'_> {
         ]
     }
 
-    /// Explanations without either of their effects that may do nothing, tried to the end from where the others are.
-    pub(super) fn without_idle<'f>(&self, best: impl Iterator<Item = &'f Found>) -> Vec<Found> {
+    /// Explanations without what they do not need by the errors of their sizes, tried to the end from where the others are; see
+    /// [`Hypothesis::simpler`].
+    pub(super) fn simpler<'f>(&self, best: impl Iterator<Item = &'f Found>) -> Vec<Found> {
         let mut starts: Vec<Hypothesis> = Vec::new();
         for found in best {
-            for part in found.hypothesis.idle(&found.errors, self.atlas) {
-                let start = found.hypothesis.without(part);
-                if !starts.iter().any(|other| other.probes() == start.probes()) {
+            for start in found.hypothesis.simpler(&found.errors, self.atlas) {
+                if !starts.iter().any(|other| other.has_patterns_of(&start)) {
                     starts.push(start);
                 }
             }
