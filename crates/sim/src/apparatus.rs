@@ -41,7 +41,7 @@ impl<'w> Apparatus<'w> {
     pub(crate) fn new(world: &'w World<'w>, further: &[Setting]) -> Result<Self, Error> {
         let own = &world.model.effects;
         let settings: Vec<Setting> = own.iter().chain(further).cloned().collect();
-        let effects = Chain::new(Active::all(&settings, world.run)?);
+        let effects = Chain::new(&settings, world.run)?;
         let all = effects.all();
         let machine = altered(&world.model.machine, all);
         Ok(Self {

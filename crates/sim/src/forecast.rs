@@ -6,7 +6,7 @@ use track::Vec2;
 
 use crate::apparatus::Apparatus;
 use crate::cast::LANES;
-use crate::effects::{Active, Chain, Hook, Moment};
+use crate::effects::{Chain, Hook, Moment};
 use crate::outlook::{Look, Outlook};
 use crate::world::World;
 use crate::{Error, Machine, Pose, ReadingNoise, Readings, Setting, WheelSpeeds};
@@ -112,16 +112,16 @@ impl<'w> Forecast<'w> {
 
     /// Notes in what the readings differ from another world's.
     fn compare(&mut self, other: &World<'_>) -> Result<(), Error> {
-        let weighs = |active: &Active| active.effect.hooks().contains(&Hook::RayFactor);
-        let others = Active::all(&other.model.effects, other.run)?;
+        let others = Chain::new(&other.model.effects, other.run)?;
         let (mine, theirs) = (&self.apparatus.machine, &other.machine);
         let rays = self.apparatus.moves()
             || !Arc::ptr_eq(&self.apparatus.geometry, &other.geometry)
             || mine.mounts != theirs.mounts
             || mine.beam != theirs.beam;
         let responses = mine.range_m != theirs.range_m || mine.response != theirs.response;
-        let places =
-            self.apparatus.weighs_rays || others.iter().any(weighs) || !self.apparatus.displacing.is_empty();
+        let places = self.apparatus.weighs_rays
+            || others.has(Hook::RayFactor)
+            || !self.apparatus.displacing.is_empty();
         // A look knows one ray of a sensor.
         let several = mine.beam.rays().len() > 1;
         self.beside = match () {
@@ -307,7 +307,7 @@ impl<'w> Forecast<'w> {
     fn passage(&self) -> Result<(Option<Passage>, f64), Error> {
         let second = |raised: Option<(usize, usize)>| -> Result<Readings, Error> {
             let world = self.apparatus.world;
-            let mut effects = Chain::new(Active::all(&world.model.effects, world.run)?);
+            let mut effects = Chain::new(&world.model.effects, world.run)?;
             let mut readings = [100.0; LANES];
             for step in 0..2 {
                 readings = [100.0; LANES];

@@ -3,7 +3,7 @@
 use track::Vec2;
 
 use super::{Active, Effect, Hit, Hook, Moment};
-use crate::{Machine, Readings, Twist, WheelSpeeds};
+use crate::{Error, Machine, Readings, Setting, Twist, WheelSpeeds};
 
 /// Effects in the order in which they act. Of each only the hooks that it has are called: a call that does nothing costs a
 /// tenth of a control step, because what the processor has at hand must be put aside for it.
@@ -15,12 +15,17 @@ pub(crate) struct Chain {
 }
 
 impl Chain {
-    pub(crate) fn new(all: Vec<Active>) -> Self {
+    /// The effects of one run.
+    ///
+    /// # Errors
+    /// An effect without values for it.
+    pub(crate) fn new(settings: &[Setting], run: usize) -> Result<Self, Error> {
+        let all = Active::all(settings, run)?;
         let having = Hook::ALL.map(|hook| {
             let has = |&i: &usize| all[i].effect.hooks().contains(&hook);
             (0..all.len()).filter(has).collect()
         });
-        Self { all, having }
+        Ok(Self { all, having })
     }
 
     /// Has every hook of every effect called from now on.
