@@ -4,7 +4,7 @@ use sim::Param;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::catalogue::{Shape, Variant};
-use super::search::{By, Lead};
+use super::leads::{By, Lead};
 use crate::candidate::label;
 use crate::detectable::{Detectable, QUANTILE_95};
 

@@ -6,6 +6,7 @@
 //! innovations; linear algebra ranks the effects, and the best are refined by the log-likelihood.
 
 mod catalogue;
+mod channels;
 mod columns;
 mod decide;
 mod detectable;
@@ -13,11 +14,13 @@ mod diagnosis;
 mod evidence;
 mod filter;
 mod groups;
+mod leads;
 mod moments;
 mod noise;
 mod pairs;
 mod recut;
 mod refine;
+mod refined;
 mod repeat;
 mod rows;
 mod screen;
@@ -25,9 +28,11 @@ mod search;
 mod separation;
 mod settling;
 mod steps;
+mod unnamed;
 mod wheels;
 
+pub use channels::Channel;
 pub use decide::Decided;
-pub use diagnosis::{Channel, LogDiagnosis, diagnose_logs};
+pub use diagnosis::{LogDiagnosis, diagnose_logs};
 pub use rows::LogRow;
 pub use separation::log_separation;

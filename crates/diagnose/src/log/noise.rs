@@ -7,8 +7,9 @@ use statrs::distribution::{ContinuousCDF, StudentsT};
 use statrs::statistics::Statistics;
 
 use super::evidence::Evidence;
+use super::leads::{By, tail};
+use super::refined::Refined;
 use super::repeat::repeats;
-use super::search::{By, Refined, tail};
 
 /// The effects on noise.
 const NOISES: [&str; 3] = ["slip-level", "camera-noise", "reading-noise"];

@@ -38,7 +38,7 @@ pub(crate) fn pairs(
             let right = DVector::from_fn(rows.len(), |a, _| sum.right[rows[a]]);
             let solution = solve(&left, &right);
             let (mine, yours) = solution.multiples.as_slice().split_at(ranges[i].len());
-            let setting = |k: usize, m: &[f64]| (of[k], super::search::start(&variants[of[k]], m));
+            let setting = |k: usize, m: &[f64]| (of[k], super::leads::start(&variants[of[k]], m));
             found.push(Pair {
                 gain: solution.gain,
                 parts: [setting(i, mine), setting(j, yours)],

@@ -1,453 +1,499 @@
-//! Which variants, in which pattern over runs and time, are worth a refinement, and which of those wins.
+//! The search for effects through what linear algebra ranks and refinements decide.
 
 use std::collections::BTreeSet;
+use std::sync::Arc;
 
-use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
-use sim::{Pattern, Setting, UNLISTED};
-use statrs::distribution::{ChiSquared, ContinuousCDF};
+use sim::{Setting, World};
 
-use super::catalogue::{Shape, Variant};
-use super::evidence::{Assessment, Evidence, Knob};
-use super::noise::{factor_again, is_noise};
-use super::refine::{Fitted, hunt, jumps, knobs, one_step, refine};
+use super::catalogue::Variant;
+use super::channels::{Channel, channels};
+use super::detectable::detectable;
+use super::evidence::Evidence;
+use super::filter::{MEASURED, Trace};
+use super::leads::{By, Lead, leads, least_p, most, of_constant_size, shortlist};
+use super::noise::{Factor, by_chance, noises, p_among, p_among_repeats, with_memory};
+use super::pairs::pairs;
+use super::refine::jumps;
+use super::refined::{Refined, pursue, together};
 use super::repeat::repeats;
-use super::screen::{Normal, solve};
+use super::screen::normals;
+use super::unnamed::Unnamed;
+use crate::candidate::label;
+use crate::{Detectable, Error};
 
-/// How an effect's values go over the runs.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) enum By {
-    Constant,
-    Time,
-    Run,
+/// A probability below which something is there: one false alarm in a hundred data sets.
+const ALARM: f64 = 0.01;
+/// Share of a gain that faults of the model may take: at very high signal none is exact.
+pub(super) const FAULTS: f64 = 0.01;
+/// A probability below which a remainder is significant.
+const SIGNIFICANT_P: f64 = 1e-3;
+/// Share of the explained log-likelihood that a remainder may have at very high signal.
+const MATTERS: f64 = 0.02;
+/// Leads that are refined.
+const PROMISING: usize = 8;
+/// Steps of a refinement at most, and those after which what is far behind is left where it is.
+pub(super) const STEPS: usize = 8;
+const FIRST_STEPS: usize = 2;
+
+/// What further effects would gain beside an explanation.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Remainder {
+    /// Its share of what both gain together.
+    pub(super) share: f64,
+    /// Probability of as much by chance.
+    pub(super) p: f64,
 }
 
-/// A variant in a pattern with what linear algebra says that it gains.
-#[derive(Debug, Clone)]
-pub(crate) struct Lead {
-    pub(crate) variant: usize,
-    pub(crate) by: By,
-    pub(crate) gain: f64,
-    pub(crate) fitted: usize,
-    /// Multiples of the columns: one list, or one for each run.
-    pub(crate) multiples: Vec<DVector<f64>>,
-    /// Squared signal, in standard errors, of each column at its step; none for sizes that have a pattern.
-    pub(crate) information: DVector<f64>,
-}
+impl Remainder {
+    const NONE: Self = Self { share: 0.0, p: 1.0 };
 
-impl Lead {
-    /// Gain less what chance and choice give to as many values (the Bayesian price of a value told to 1 in 80).
-    pub(crate) fn score(&self) -> f64 {
-        trusted(self.gain, self.fitted, self.by) - price(self.fitted, self.by)
+    pub(super) fn matters(&self) -> bool {
+        self.p < SIGNIFICANT_P && self.share > MATTERS
     }
-
-    /// Probability of as large a gain by chance.
-    pub(crate) fn p(&self) -> f64 {
-        tail(2.0 * self.gain, self.fitted)
-    }
 }
 
-/// Log-likelihood that a candidate must pay for its values and its pattern.
-pub(crate) fn price(fitted: usize, by: By) -> f64 {
-    2.2 * fitted as f64 + if by == By::Constant { 0.0 } else { 4.0 }
+/// The state of the search for effects.
+pub(super) struct Search<'a> {
+    pub(super) evidence: Evidence<'a>,
+    pub(super) variants: Vec<Variant>,
+    pub(super) base: Vec<f64>,
+    pub(super) found: Vec<Refined>,
+    pub(super) p: f64,
+    pub(super) remainder: Remainder,
+    pub(super) unlisted: Option<Unnamed>,
+    pub(super) channels: [Channel; MEASURED],
+    pub(super) step: Option<f64>,
+    pub(super) step_gain: f64,
+    pub(super) steps: usize,
+    pub(super) detectable: Vec<Detectable>,
+    /// The last screening and its settings.
+    pub(super) screened: Option<(Vec<Setting>, Arc<Screened<'a>>)>,
 }
 
-/// What counts of a gain: at very high signal no model is exact, and free values follow its faults.
-fn trusted(gain: f64, fitted: usize, by: By) -> f64 {
-    const BY_VALUE: f64 = 0.002;
-    const BY_PATTERN: f64 = 0.007;
-    let pattern = if by == By::Constant { 0.0 } else { BY_PATTERN };
-    let values = BY_VALUE * fitted.saturating_sub(1).min(3) as f64;
-    (1.0 - pattern - values) * gain
-}
+/// Two effects, each with the setting where a refinement of both begins.
+type Parts = [(Variant, Setting); 2];
 
-/// Probability that a chi-squared variable exceeds a value.
-pub(crate) fn tail(value: f64, freedom: usize) -> f64 {
-    ChiSquared::new(freedom.max(1) as f64).map_or(1.0, |chi| chi.sf(value.max(0.0)))
-}
+/// Every run in its world, filtered, and the leads over them.
+type Screened<'a> = (Vec<(World<'a>, Trace)>, Vec<Lead>);
 
-/// Every variant in every pattern.
-pub(crate) fn leads(evidence: &Evidence<'_>, variants: &[Variant], normals: &[Vec<Normal>]) -> Vec<Lead> {
-    let runs = evidence.runs();
-    (variants.iter().zip(normals).enumerate())
-        .flat_map(|(i, (variant, normals))| {
-            let mut leads = vec![constant(i, normals)];
-            if patterns(variant) {
-                leads.push(by_time(i, normals));
-                if runs.len() > 1 {
-                    leads.push(by_run(evidence, i, normals, &runs));
-                }
-            }
-            leads
+impl<'a> Search<'a> {
+    pub(super) fn new(evidence: Evidence<'a>, step: Option<f64>) -> Result<Self, Error> {
+        let traces = evidence.traces(&[]).ok_or(Error::NoLog)?;
+        let base: Vec<f64> = traces.iter().map(|(_, trace)| trace.log_likelihood).collect();
+        let unrounded = Evidence {
+            step_counts: 0.0,
+            ..evidence.elsewhere(evidence.scene)
+        };
+        let step_gain = match step {
+            Some(_) => base.iter().sum::<f64>() - unrounded.likelihood(&[]).unwrap_or(f64::NEG_INFINITY),
+            None => 0.0,
+        };
+        Ok(Self {
+            variants: evidence.variants(),
+            channels: channels(&traces),
+            steps: traces.iter().map(|(_, trace)| trace.instants.len()).sum(),
+            base,
+            evidence,
+            found: Vec::new(),
+            p: 1.0,
+            remainder: Remainder::NONE,
+            unlisted: None,
+            step,
+            step_gain,
+            detectable: Vec::new(),
+            screened: None,
         })
-        .collect()
-}
-
-/// Whether a variant may differ by run or change in time: not where its place or its size is one of a scan.
-fn patterns(variant: &Variant) -> bool {
-    match variant.shape {
-        Shape::Scan => variant.spec.name == "cone-of-view",
-        Shape::Along => variant.spec.name == "directional-light",
-        Shape::Linear | Shape::Polar => *variant.spec != UNLISTED,
     }
-}
 
-fn sums(normals: impl Iterator<Item = Normal>) -> Option<Normal> {
-    normals.reduce(|a, b| Normal {
-        right: a.right + b.right,
-        left: a.left + b.left,
-        right_time: a.right_time + b.right_time,
-        cross_time: a.cross_time + b.cross_time,
-        left_time: a.left_time + b.left_time,
-    })
-}
-
-pub(crate) fn constant(variant: usize, normals: &[Normal]) -> Lead {
-    let sum = sums(normals.iter().cloned());
-    let information = (sum.as_ref()).map_or(DVector::zeros(0), |sum| sum.left.diagonal());
-    let solution = sum.map(|sum| solve(&sum.left, &sum.right));
-    let (multiples, gain) = solution.map_or((DVector::zeros(0), 0.0), |s| (s.multiples, s.gain));
-    Lead {
-        variant,
-        by: By::Constant,
-        gain,
-        fitted: multiples.len(),
-        multiples: vec![multiples],
-        information,
+    pub(super) fn total(&self) -> f64 {
+        self.base.iter().sum()
     }
-}
 
-fn by_time(variant: usize, normals: &[Normal]) -> Lead {
-    let Some(sum) = sums(normals.iter().cloned()) else {
-        return constant(variant, normals);
-    };
-    let k = sum.right.len();
-    let mut left = DMatrix::zeros(2 * k, 2 * k);
-    left.view_mut((0, 0), (k, k)).copy_from(&sum.left);
-    left.view_mut((0, k), (k, k)).copy_from(&sum.cross_time);
-    left.view_mut((k, 0), (k, k)).copy_from(&sum.cross_time);
-    left.view_mut((k, k), (k, k)).copy_from(&sum.left_time);
-    let right = DVector::from_iterator(2 * k, sum.right.iter().chain(sum.right_time.iter()).copied());
-    let solution = solve(&left, &right);
-    Lead {
-        variant,
-        by: By::Time,
-        gain: solution.gain,
-        fitted: 2 * k,
-        multiples: vec![solution.multiples],
-        information: DVector::zeros(0),
-    }
-}
-
-pub(crate) fn by_run(evidence: &Evidence<'_>, variant: usize, normals: &[Normal], runs: &[usize]) -> Lead {
-    let of = |run: usize| {
-        let mine = evidence
-            .stretches
-            .iter()
-            .zip(normals)
-            .filter(move |(s, _)| s.run == run);
-        sums(mine.map(|(_, n)| n.clone())).map(|sum| solve(&sum.left, &sum.right))
-    };
-    let solutions: Vec<_> = runs.iter().filter_map(|&run| of(run)).collect();
-    Lead {
-        variant,
-        by: By::Run,
-        gain: solutions.iter().map(|s| s.gain).sum(),
-        fitted: solutions.iter().map(|s| s.multiples.len()).sum(),
-        multiples: solutions.into_iter().map(|s| s.multiples).collect(),
-        information: DVector::zeros(0),
-    }
-}
-
-/// The leads worth a refinement: the best of each effect, at most two of one, the best first.
-pub(crate) fn shortlist(leads: &[Lead], variants: &[Variant], most: usize) -> Vec<Lead> {
-    let mut sorted: Vec<&Lead> = leads.iter().collect();
-    sorted.sort_by(|a, b| b.score().total_cmp(&a.score()));
-    let mut list: Vec<Lead> = Vec::new();
-    let name = |lead: &Lead| variants[lead.variant].spec.name;
-    for lead in sorted {
-        let same = list.iter().filter(|other| name(other) == name(lead)).count();
-        let again = list
-            .iter()
-            .any(|other| other.variant == lead.variant && other.by <= lead.by);
-        if same < 2 && !again && list.len() < most {
-            list.push(lead.clone());
+    /// The screening of all variants at given settings.
+    fn screen(&mut self, settings: &[Setting]) -> Option<Arc<Screened<'a>>> {
+        if let Some((_, found)) = self.screened.as_ref().filter(|last| last.0 == settings) {
+            return Some(Arc::clone(found));
         }
-    }
-    list
-}
-
-/// A candidate with its best values and their pattern.
-#[derive(Debug, Clone)]
-pub(crate) struct Refined {
-    pub(crate) settings: Vec<Setting>,
-    /// Standard errors, setting by setting in the order of the pattern's values.
-    pub(crate) standard_errors: Vec<Vec<f64>>,
-    pub(crate) gain: f64,
-    pub(crate) fitted: usize,
-    pub(crate) by: By,
-}
-
-impl Refined {
-    pub(crate) fn score(&self) -> f64 {
-        trusted(self.gain, self.fitted, self.by) - price(self.fitted, self.by)
+        let found = Arc::new(screened(&self.evidence, settings, &self.variants)?);
+        self.screened = Some((settings.to_vec(), Arc::clone(&found)));
+        Some(found)
     }
 
-    /// The effects' names, whatever their order.
-    pub(crate) fn names(&self) -> BTreeSet<&'static str> {
-        self.settings.iter().map(|setting| setting.spec.name).collect()
-    }
-
-    /// Refined by further steps from where it is; `base` is the log-likelihood of the declared model.
-    pub(crate) fn further(
-        self,
-        evidence: &Evidence<'_>,
-        variants: &[Variant],
-        base: f64,
-        steps: usize,
-    ) -> Self {
-        let knobs = self.knobs(variants);
-        match refine(evidence, self.settings.clone(), knobs, steps) {
-            Some(fitted) => refined(fitted, base, self.by),
-            None => self,
+    /// Single effects; `None` if there is nothing to explain, else the leads at the declared model.
+    pub(super) fn alone(&mut self) -> Option<Vec<Lead>> {
+        let leads = self.screen(&[])?.1.clone();
+        self.detectable = detectable(&leads, &self.variants, ALARM);
+        let noise = noises(&self.evidence, &[], self.total());
+        let by_mean = self.p_by_mean(&leads);
+        self.p = by_mean.min(if by_mean < ALARM {
+            by_chance(&noise)
+        } else {
+            p_among_repeats(&self.evidence, &[], &noise, ALARM)
+        });
+        if self.p >= ALARM {
+            return None;
         }
+        let list = self.promising(shortlist(&leads, &self.variants, PROMISING));
+        self.found = self.pursued(&list);
+        self.sort();
+        self.accept_noise(noise, &list);
+        self.sort();
+        Some(leads)
     }
 
-    /// The values that a refinement may change: not those that jump or go by run.
-    fn knobs(&self, variants: &[Variant]) -> Vec<Knob> {
-        (self.settings.iter().enumerate())
-            .filter(|(_, setting)| !jumps(setting) && !matches!(setting.pattern, Pattern::ByRun(_)))
-            .filter_map(|(i, setting)| {
-                let variant = Variant::of(setting, variants)?;
-                Some(knobs(variant, i, &setting.pattern))
+    /// Probability of the best lead by chance. Readings in coarse steps are no normal numbers: where they were rounded, the
+    /// best leads are compared with what they gain in simulated logs too.
+    fn p_by_mean(&self, leads: &[Lead]) -> f64 {
+        /// What is no gain at all, so that logarithms of gains exist.
+        const LEAST: f64 = 1.0;
+        let p = least_p(leads);
+        if self.step.is_none() || p >= ALARM {
+            return p;
+        }
+        let best = self.variants_of(&shortlist(leads, &self.variants, PROMISING));
+        let logs = repeats(&self.evidence, &[], |repeated| {
+            Some(most_left(repeated, &[], &best)?.max(LEAST).ln())
+        });
+        p.max(p_among(most(leads).max(LEAST).ln(), &logs))
+    }
+
+    /// The leads refined: a few steps each, then to the end those that may still be the best.
+    fn pursued(&self, list: &[Lead]) -> Vec<Refined> {
+        let pursue = |lead: &Lead, steps| {
+            pursue(
+                &self.evidence,
+                &self.variants[lead.variant],
+                lead,
+                &self.base,
+                steps,
+            )
+        };
+        let first: Vec<(&Lead, Refined)> = (list.par_iter())
+            .filter_map(|lead| Some((lead, pursue(lead, FIRST_STEPS)?)))
+            .collect();
+        let least = least_in_reach(first.iter().map(|(_, refined)| refined));
+        first
+            .into_par_iter()
+            .map(|(lead, refined)| {
+                if refined.score() < least || refined.settings.iter().all(jumps) {
+                    return refined;
+                }
+                match lead.by {
+                    By::Run => pursue(lead, STEPS).unwrap_or(refined),
+                    By::Constant | By::Time => {
+                        refined.further(&self.evidence, &self.variants, self.total(), STEPS)
+                    }
+                }
             })
-            .flatten()
             .collect()
     }
 
-    /// The settings fitted again to other evidence, from where they are; those that jump or go by run stay.
-    fn refit(&self, evidence: &Evidence<'_>, variants: &[Variant]) -> Vec<Setting> {
-        let knobs = self.knobs(variants);
-        match self.assessed(evidence, &knobs) {
-            Some(now) => one_step(evidence, &self.settings, &knobs, &now),
-            None => self.settings.clone(),
-        }
+    /// The leads that gain, where linear algebra puts them, a fair share of what the best of them gains there.
+    fn promising(&self, list: Vec<Lead>) -> Vec<Lead> {
+        let gains: Vec<f64> = (list.par_iter())
+            .map(|lead| {
+                let setting = lead.start(&self.variants[lead.variant]);
+                self.evidence
+                    .likelihood(&[setting])
+                    .map_or(0.0, |likelihood| likelihood - self.total())
+            })
+            .collect();
+        let best = gains.iter().copied().fold(0.0, f64::max);
+        let keeps =
+            |(lead, gain): &(Lead, f64)| lead.by == By::Run || *gain > 0.2 * best || lead.gain > 0.9 * best;
+        list.into_iter()
+            .zip(gains)
+            .filter(keeps)
+            .map(|(lead, _)| lead)
+            .collect()
     }
 
-    /// The settings fitted again without each of so many runs; those that jump or go by run stay.
-    pub(crate) fn refit_without_each(
-        &self,
-        evidence: &Evidence<'_>,
-        variants: &[Variant],
-        runs: usize,
-    ) -> Vec<Vec<Setting>> {
-        let knobs = self.knobs(variants);
-        let Some(now) = self.assessed(evidence, &knobs) else {
-            return vec![self.settings.clone(); runs];
-        };
-        let without = |run: usize| {
-            let others = evidence.without(run);
-            one_step(&others, &self.settings, &knobs, &now.without(run, evidence))
-        };
-        (0..runs).into_par_iter().map(without).collect()
+    fn variants_of(&self, leads: &[Lead]) -> Vec<Variant> {
+        let variant = |lead: &Lead| self.variants[lead.variant].clone();
+        leads.iter().map(variant).collect()
     }
 
-    /// How well the settings explain the logs; `None` where nothing of them can be fitted.
-    fn assessed(&self, evidence: &Evidence<'_>, knobs: &[Knob]) -> Option<Assessment> {
-        (!knobs.is_empty())
-            .then(|| evidence.assess(&self.settings, knobs))
-            .flatten()
+    /// The effects of the best candidate; none if there is none.
+    pub(super) fn best(&self) -> &[Setting] {
+        self.found.first().map_or(&[], |best| &best.settings)
     }
 
-    /// The same with errors at least as large as those of fits to simulated logs of it (a parametric bootstrap; Efron and
-    /// Tibshirani 1993): the filter is linear about a pose, from which large noise takes the robot far, and readings near
-    /// edges do not count.
-    pub(crate) fn with_honest_errors(mut self, evidence: &Evidence<'_>, variants: &[Variant]) -> Self {
-        if self.knobs(variants).is_empty() && !self.settings.iter().any(is_noise) {
-            return self;
-        }
-        let fits = repeats(evidence, &self.settings, |repeated| {
-            let mut fit = self.refit(repeated, variants);
-            if let Some((place, factor)) = factor_again(repeated, &self.settings) {
-                fit[place] = Setting::constant(fit[place].spec, [factor]);
-            }
-            Some(fit)
-        });
-        for (i, (setting, errors)) in self.settings.iter().zip(&mut self.standard_errors).enumerate() {
-            for (j, (value, error)) in numbers(setting).iter().zip(errors).enumerate() {
-                let square = |fit: &Vec<Setting>| (numbers(&fit[i])[j] - value).powi(2);
-                let mean = fits.iter().map(square).sum::<f64>() / fits.len() as f64;
-                if *error > 0.0 {
-                    *error = error.max(mean.sqrt());
-                }
-            }
-        }
-        self
+    pub(super) fn best_in_words(&self) -> String {
+        let labels: Vec<String> = self.best().iter().map(label).collect();
+        labels.join(" + ")
     }
 
-    /// What was fitted beside another candidate, as one candidate of both.
-    pub(crate) fn after(mut self, first: &Self) -> Self {
-        let own = std::mem::replace(&mut self.standard_errors, first.standard_errors.clone());
-        self.standard_errors.extend(own);
-        self.gain += first.gain;
-        self.fitted += first.fitted;
-        self.by = first.by;
-        self
+    /// The effects of the best candidates, which may change places where other readings count.
+    pub(super) fn rivals(&self) -> impl Iterator<Item = &[Setting]> {
+        const NEARLY: f64 = 0.8;
+        const MOST: usize = 3;
+        let best = self.found.first().map_or(0.0, Refined::score);
+        (self.found.iter().take(MOST))
+            .filter(move |other| other.score() >= NEARLY * best)
+            .map(|other| other.settings.as_slice())
     }
-}
 
-/// Refines a lead. `base` is the log-likelihood of the declared model by stretch.
-pub(crate) fn pursue(
-    evidence: &Evidence<'_>,
-    variant: &Variant,
-    lead: &Lead,
-    base: &[f64],
-    steps: usize,
-) -> Option<Refined> {
-    match lead.by {
-        By::Constant => {
-            let setting = Setting::constant(variant.spec, variant.values_at(lead.multiples[0].as_slice()));
-            let fitted = follow(evidence, variant, setting, steps)?;
-            Some(refined(fitted, base.iter().sum(), By::Constant))
-        }
-        By::Time => {
-            let k = variant.sizes.len();
-            let start = variant.values_at(&lead.multiples[0].as_slice()[..k]);
-            let per_s = vec![0.0; start.len()];
-            let setting = Setting {
-                spec: variant.spec,
-                pattern: Pattern::ByTime { start, per_s },
-            };
-            let knobs = knobs(variant, 0, &setting.pattern);
-            Some(refined(
-                refine(evidence, vec![setting], knobs, steps)?,
-                base.iter().sum(),
-                By::Time,
-            ))
-        }
-        By::Run => {
-            let runs = evidence.runs();
-            let parts = (runs.par_iter().zip(&lead.multiples))
-                .map(|(&run, multiples)| {
-                    let setting = Setting::constant(variant.spec, variant.values_at(multiples.as_slice()));
-                    follow(&evidence.of_run(run), variant, setting, steps)
+    /// The same search with other evidence, its candidates refined again by it.
+    pub(super) fn renewed<'b>(self, evidence: Evidence<'b>) -> Result<Search<'b>, Error> {
+        let mut renewed = Search::new(evidence, self.step)?;
+        (renewed.p, renewed.detectable) = (self.p, self.detectable);
+        renewed.found = (self.found.iter())
+            .filter_map(|found| renewed.renew(found, &renewed.evidence, renewed.total()))
+            .collect();
+        renewed.sort();
+        Ok(renewed)
+    }
+
+    /// The effects of the best candidate refined again by other evidence.
+    pub(super) fn best_by(&self, evidence: &Evidence<'_>) -> Option<Vec<Setting>> {
+        let renewed = self.renew(self.found.first()?, evidence, evidence.likelihood(&[])?)?;
+        Some(renewed.settings)
+    }
+
+    /// A candidate refined again, from where it is, by evidence with this log-likelihood of the declared model.
+    fn renew(&self, found: &Refined, evidence: &Evidence<'_>, base: f64) -> Option<Refined> {
+        let variant = Variant::of(&found.settings[0], &self.variants);
+        match (variant, found.by) {
+            (Some(variant), By::Constant) if !jumps(&found.settings[0]) => together(
+                evidence,
+                &[(variant.clone(), found.settings[0].clone())],
+                base,
+                STEPS,
+            ),
+            _ => {
+                let gain = evidence.likelihood(&found.settings)? - base;
+                Some(Refined {
+                    gain,
+                    ..found.clone()
                 })
-                .collect::<Option<Vec<_>>>()?;
-            Some(by_runs(evidence, variant, &runs, &parts, base))
+            }
         }
     }
-}
 
-fn follow(evidence: &Evidence<'_>, variant: &Variant, setting: Setting, steps: usize) -> Option<Fitted> {
-    if jumps(&setting) {
-        let spread = match setting.spec.name {
-            "command-delay" => 0.032,
-            "speed-step" => 5e-4,
-            "sensor-reach" => 0.04,
-            _ => 0.003,
+    /// Further effects, and whether what is left matters.
+    pub(super) fn finish(&mut self, leads: &[Lead]) {
+        self.second(leads);
+        self.sort();
+        self.judge();
+        if let (Some(best), None, None) = (self.found.first_mut(), self.step, &self.unlisted) {
+            *best = best.clone().with_honest_errors(&self.evidence, &self.variants);
+        }
+        if let Some(twin) = self.found.first().and_then(with_memory) {
+            self.found.insert(1, twin);
+        }
+    }
+
+    fn sort(&mut self) {
+        self.found.sort_by(|a, b| b.score().total_cmp(&a.score()));
+    }
+
+    /// A noise effect is a candidate only where nothing with a mean is left once it is fitted; `promising` would be first.
+    fn accept_noise(&mut self, noise: Vec<Factor>, promising: &[Lead]) {
+        /// Log-likelihood that a column may still gain then: twice what it usually does at small noise.
+        const LEFT: f64 = 14.0;
+        const TIMES: f64 = 2.0;
+        const HOPELESS: f64 = 10.0;
+        /// Share of the best score by which a gain known to a tenth may fall short of it.
+        const NEAR: f64 = 0.8;
+        let best = self.found.first().map_or(0.0, Refined::score);
+        let largest = noise.into_iter().max_by(|a, b| a.gain.total_cmp(&b.gain));
+        let Some(one) = largest
+            .filter(|one| one.gain > NEAR * best)
+            .and_then(|one| one.refined(&self.evidence, &[], self.total()))
+        else {
+            return;
         };
-        return hunt(evidence, &setting, spread);
-    }
-    let knobs = knobs(variant, 0, &setting.pattern);
-    refine(evidence, vec![setting], knobs, steps)
-}
-
-fn refined(fitted: Fitted, base: f64, by: By) -> Refined {
-    let standard_errors = (fitted.settings.iter().enumerate())
-        .map(|(i, setting)| spread_errors(setting, i, &fitted))
-        .collect();
-    Refined {
-        gain: fitted.log_likelihood - base,
-        fitted: fitted.knobs.len(),
-        settings: fitted.settings,
-        standard_errors,
-        by,
-    }
-}
-
-/// The pattern's values, in the order of their standard errors; none where they go by run.
-fn numbers(setting: &Setting) -> Vec<f64> {
-    match &setting.pattern {
-        Pattern::Constant(values) => values.clone(),
-        Pattern::ByTime { start, per_s } => [start.as_slice(), per_s].concat(),
-        Pattern::ByRun(_) => Vec::new(),
-    }
-}
-
-/// Standard errors in the order of the pattern's values, 0 where a value was not fitted.
-fn spread_errors(setting: &Setting, number: usize, fitted: &Fitted) -> Vec<f64> {
-    let (count, slots) = match &setting.pattern {
-        Pattern::ByTime { start, .. } => (start.len(), 2 * start.len()),
-        Pattern::Constant(values) => (values.len(), values.len()),
-        Pattern::ByRun(runs) => (runs[0].len(), runs[0].len()),
-    };
-    let mut errors = vec![0.0; slots];
-    for (knob, error) in fitted
-        .knobs
-        .iter()
-        .zip(&fitted.standard_errors)
-        .filter(|(knob, _)| knob.setting == number)
-    {
-        errors[knob.value + if knob.slope { count } else { 0 }] = *error;
-    }
-    errors
-}
-
-fn by_runs(
-    evidence: &Evidence<'_>,
-    variant: &Variant,
-    runs: &[usize],
-    parts: &[Fitted],
-    base: &[f64],
-) -> Refined {
-    let mut values = vec![variant.values.clone(); runs.last().map_or(0, |last| last + 1)];
-    let mut errors = Vec::new();
-    for (&run, part) in runs.iter().zip(parts) {
-        if let Pattern::Constant(found) = &part.settings[0].pattern {
-            values[run].clone_from(found);
+        let promising = self.variants_of(promising);
+        let hopes = |left: f64| left < HOPELESS * LEFT;
+        if one.score() > best.max(4.0)
+            && most_left(&self.evidence, &one.settings, &promising).is_some_and(hopes)
+        {
+            let left = self
+                .screen(&one.settings)
+                .map_or(f64::INFINITY, |found| most(&found.1));
+            if left < LEFT || hopes(left) && left < TIMES * self.usually_left(&one) {
+                self.found.push(one);
+            }
         }
-        errors.extend(spread_errors(&part.settings[0], 0, part));
     }
-    let base: f64 = (evidence.stretches.iter().zip(base)).map(|(_, base)| base).sum();
-    Refined {
-        settings: vec![Setting {
-            spec: variant.spec,
-            pattern: Pattern::ByRun(values),
-        }],
-        standard_errors: vec![errors],
-        gain: parts.iter().map(|part| part.log_likelihood).sum::<f64>() - base,
-        fitted: parts.iter().map(|part| part.knobs.len()).sum(),
-        by: By::Run,
+
+    /// What a column gains at most beside a noise effect in logs that have this effect alone: at large noise the filter is not
+    /// linear enough to leave nothing.
+    fn usually_left(&self, noise: &Refined) -> f64 {
+        let left = |repeated: &Evidence<'_>| most_left(repeated, &noise.settings, &self.variants);
+        let all = repeats(&self.evidence, &noise.settings, left);
+        all.into_iter().fold(0.0, f64::max)
+    }
+
+    /// Looks for a second effect beside the best one, and for the best pairs.
+    fn second(&mut self, first: &[Lead]) {
+        let Some(best) = self.found.first().cloned() else {
+            return;
+        };
+        let Some(screened) = self.screen(&best.settings) else {
+            return;
+        };
+        let (traces, leads) = &*screened;
+        self.settle(traces, leads, best.gain);
+        let noise = noises(&self.evidence, &best.settings, self.total() + best.gain);
+        let left = noise.iter().map(|n| n.gain).fold(0.0, f64::max) / best.gain.max(1e-9);
+        if self.remainder.p.min(by_chance(&noise)) >= SIGNIFICANT_P || self.remainder.share.max(left) < FAULTS
+        {
+            return;
+        }
+        let mut more: Vec<Refined> = Vec::new();
+        if self.remainder.share < MATTERS || self.remainder.p >= SIGNIFICANT_P {
+            let noise = noise
+                .into_iter()
+                .filter(|n| n.gain > 10.0)
+                .max_by(|a, b| a.gain.total_cmp(&b.gain))
+                .filter(|n| {
+                    let one = std::slice::from_ref(n);
+                    p_among_repeats(&self.evidence, &best.settings, one, SIGNIFICANT_P) < SIGNIFICANT_P
+                })
+                .map(|n| self.beside_rivals(&n, &best));
+            more.extend(noise.into_iter().flatten());
+        }
+        if best.by == By::Constant {
+            let mut starts = self.beside(&best, leads);
+            starts.extend(self.joint(first));
+            more.extend(self.pursued_together(&starts));
+        }
+        // An effect that linear algebra did not see may stand alone.
+        let pair = more.iter().max_by(|a, b| a.score().total_cmp(&b.score()));
+        let alone = pair.map_or(Vec::new(), |pair| self.each_alone(pair));
+        let better = alone.into_iter().filter(|alone| alone.score() > best.score());
+        self.found.extend(better);
+        self.sort();
+        let best = self.found[0].clone();
+        // Each further value must gain ten.
+        more.retain(|pair| {
+            let further = pair.fitted.saturating_sub(best.fitted).max(1) as f64;
+            pair.gain - best.gain > (10.0 * further).max(FAULTS * best.gain)
+        });
+        self.found.extend(more);
+        self.sort();
+        let best = self.found[0].clone();
+        if let Some(screened) = self.screen(&best.settings) {
+            self.settle(&screened.0, &screened.1, best.gain);
+        }
+    }
+
+    /// A noise effect beside the best candidate, and beside single effects that explain nearly as much: large noise hides what tells
+    /// them apart.
+    fn beside_rivals(&self, noise: &Factor, best: &Refined) -> Vec<Refined> {
+        const NEARLY: f64 = 0.98;
+        const MOST: usize = 3;
+        let is_rival = |other: &&Refined| {
+            other.settings == best.settings
+                || other.score() > NEARLY * best.score() && other.names() != best.names()
+        };
+        (self.found.iter().filter(is_rival).take(MOST))
+            .filter_map(|one| {
+                let base = self.total() + one.gain;
+                let noise = noise.elsewhere(&self.evidence, &one.settings, base)?;
+                Some(noise.refined(&self.evidence, &one.settings, base)?.after(one))
+            })
+            .collect()
+    }
+
+    /// Each effect of a pair refined without the other, from where it is.
+    fn each_alone(&self, pair: &Refined) -> Vec<Refined> {
+        (pair.settings.par_iter())
+            .filter(|setting| !jumps(setting))
+            .filter_map(|setting| {
+                let variant = Variant::of(setting, &self.variants)?;
+                together(
+                    &self.evidence,
+                    &[(variant.clone(), setting.clone())],
+                    self.total(),
+                    STEPS,
+                )
+            })
+            .collect()
+    }
+
+    /// Notes what is left beside an explanation.
+    fn settle(&mut self, traces: &[(World<'a>, Trace)], leads: &[Lead], gain: f64) {
+        self.channels = channels(traces);
+        let left = most(leads);
+        self.remainder = Remainder {
+            share: left / (left + gain).max(1e-9),
+            p: least_p(leads),
+        };
+    }
+
+    /// The best effect with each of the leads that are left beside it, where a refinement of the two begins.
+    fn beside(&self, best: &Refined, leads: &[Lead]) -> Vec<Parts> {
+        let Some(of_best) = Variant::of(&best.settings[0], &self.variants) else {
+            return Vec::new();
+        };
+        let list = shortlist(&of_constant_size(leads), &self.variants, 3);
+        (list.iter())
+            .map(|lead| {
+                let variant = &self.variants[lead.variant];
+                [
+                    (of_best.clone(), best.settings[0].clone()),
+                    (variant.clone(), lead.start(variant)),
+                ]
+            })
+            .collect()
+    }
+
+    /// The best pairs over the columns of the declared model, where their refinements begin.
+    fn joint(&self, leads: &[Lead]) -> Vec<Parts> {
+        const AMONG: usize = 36;
+        let list: Vec<usize> = shortlist(&of_constant_size(leads), &self.variants, AMONG)
+            .iter()
+            .map(|lead| lead.variant)
+            .collect();
+        let Some(traces) = self.evidence.traces(&[]) else {
+            return Vec::new();
+        };
+        let found = pairs(&traces, &self.variants, &list, 3).unwrap_or_default();
+        (found.into_iter())
+            .map(|pair| pair.parts.map(|(i, setting)| (self.variants[i].clone(), setting)))
+            .collect()
+    }
+
+    /// Pairs refined together: a few steps, then to the end the best of every two names that may still be the best of all.
+    fn pursued_together(&self, starts: &[Parts]) -> Vec<Refined> {
+        let mut first: Vec<Refined> = (starts.par_iter())
+            .filter_map(|parts| together(&self.evidence, parts, self.total(), FIRST_STEPS))
+            .collect();
+        first.sort_by(|a, b| b.score().total_cmp(&a.score()));
+        let least = least_in_reach(first.iter());
+        let mut names = BTreeSet::new();
+        let (hopeful, others): (Vec<Refined>, Vec<Refined>) =
+            (first.into_iter()).partition(|pair| names.insert(pair.names()) && pair.score() >= least);
+        let further =
+            |pair: Refined| pair.further(&self.evidence, &self.variants, self.total(), STEPS - FIRST_STEPS);
+        (hopeful.into_par_iter().map(further)).chain(others).collect()
     }
 }
 
-/// Refines several settings together from where each of them was best alone.
-pub(crate) fn together(
-    evidence: &Evidence<'_>,
-    parts: &[(Variant, Setting)],
-    base: f64,
-    steps: usize,
-) -> Option<Refined> {
-    let settings: Vec<Setting> = parts.iter().map(|(_, setting)| setting.clone()).collect();
-    let knobs = (parts.iter().enumerate())
-        .filter(|(_, (_, setting))| !jumps(setting))
-        .flat_map(|(i, (variant, setting))| knobs(variant, i, &setting.pattern))
-        .collect();
-    Some(refined(
-        refine(evidence, settings, knobs, steps)?,
-        base,
-        By::Constant,
-    ))
+/// The score from which, after the first steps, a candidate may still become the best one of these.
+fn least_in_reach<'a>(first: impl Iterator<Item = &'a Refined>) -> f64 {
+    /// Log-likelihood, and share of the best one's, by which what lies behind does not come back.
+    const BEHIND: (f64, f64) = (30.0, 0.06);
+    let best = first.map(Refined::score).fold(0.0, f64::max);
+    best - BEHIND.0.max(BEHIND.1 * best)
 }
 
-/// The variants' multiples in a joint solution as a setting.
-pub(crate) fn start(variant: &Variant, multiples: &[f64]) -> Setting {
-    Setting::constant(variant.spec, variant.values_at(multiples))
+/// The logs filtered with settings, and what variants gain beside these.
+pub(super) fn screened<'a>(
+    evidence: &Evidence<'a>,
+    settings: &[Setting],
+    variants: &[Variant],
+) -> Option<Screened<'a>> {
+    let traces = evidence.traces(settings)?;
+    let normals = normals(&traces, variants).ok()?;
+    let leads = leads(evidence, variants, &normals);
+    Some((traces, leads))
 }
 
-impl Lead {
-    /// Where a refinement of the constant pattern begins.
-    pub(crate) fn start(&self, variant: &Variant) -> Setting {
-        start(variant, self.multiples[0].as_slice())
-    }
+/// The best score of some variants beside settings.
+fn most_left(evidence: &Evidence<'_>, settings: &[Setting], variants: &[Variant]) -> Option<f64> {
+    screened(evidence, settings, variants).map(|(_, leads)| most(&leads))
 }

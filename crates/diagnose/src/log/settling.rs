@@ -5,8 +5,9 @@ use sim::Pattern;
 use super::catalogue::stage_of;
 use super::evidence::Evidence;
 use super::groups::settling_variants;
+use super::leads::{Lead, constant, start};
+use super::refined::{Refined, together};
 use super::screen::normals;
-use super::search::{Lead, Refined, constant, start, together};
 
 /// Steps of a refinement at most.
 const STEPS: usize = 12;

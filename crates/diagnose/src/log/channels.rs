@@ -1,0 +1,47 @@
+//! How white the innovations of a filtered log are.
+
+use sim::World;
+
+use super::filter::{MEASURED, Trace};
+
+/// How white the filter's innovations of one measured number are.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Channel {
+    /// Innovations that count; of readings only those that are far from being cut.
+    pub count: usize,
+    /// Their mean square, 1 under the model.
+    pub mean_square: f64,
+    /// Fourth moment over squared second moment, 3 for normal ones.
+    pub kurtosis: f64,
+    /// Product of neighbours over the mean square, 0 under the model.
+    pub correlation: f64,
+}
+
+/// Moments of the innovations.
+pub(super) fn channels(traces: &[(World<'_>, Trace)]) -> [Channel; MEASURED] {
+    std::array::from_fn(|m| {
+        let (mut count, mut sums, mut before) = (0_usize, [0.0; 3], 0.0);
+        for (_, trace) in traces {
+            for instant in trace.instants.iter().filter(|instant| instant.used >> m & 1 == 1) {
+                if m >= 2 && instant.uncut[m - 2] < 4.0 * instant.deviation[m - 2] {
+                    continue;
+                }
+                let e = instant.innovation[m];
+                count += 1;
+                sums[0] += e * e;
+                sums[1] += e.powi(4);
+                sums[2] += e * before;
+                before = e;
+            }
+        }
+        let n = count.max(1) as f64;
+        let mean_square = sums[0] / n;
+        let scale = mean_square.max(1e-12);
+        Channel {
+            count,
+            mean_square,
+            kurtosis: sums[1] / n / (scale * scale),
+            correlation: sums[2] / n / scale,
+        }
+    })
+}
