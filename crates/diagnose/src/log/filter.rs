@@ -3,7 +3,7 @@
 
 use sim::{Forecast, Look, Outlook, Pose, PoseMatrix, Vec2, WheelSpeeds, World};
 
-use super::moments::cut;
+use super::moments::{Likelihood, cut, likelihood_of_cut};
 use super::rows::{LogRow, start_pose};
 
 /// Numbers measured in a control step: camera x and y, then the eight readings.
@@ -34,6 +34,8 @@ pub(crate) struct Instant {
     /// Whitened innovations and what they were multiplied by.
     pub(crate) innovation: [f64; MEASURED],
     pub(crate) per_scale: [f64; MEASURED],
+    /// Of the numbers that count.
+    pub(crate) likelihood: Likelihood,
     pub(crate) slope: [[f64; 3]; MEASURED],
     pub(crate) gain: [[f64; 3]; MEASURED],
     /// Pose after all of them, the command and where it led.
@@ -43,11 +45,23 @@ pub(crate) struct Instant {
     pub(crate) turned: Vec2,
 }
 
+impl Instant {
+    /// Counts a number, if it does count, by its likelihood; by default that of its innovation.
+    fn count(&mut self, m: usize, likelihood: Option<Likelihood>) {
+        if self.used >> m & 1 == 1 {
+            self.likelihood = self.likelihood.and(likelihood.unwrap_or(Likelihood {
+                factor: self.per_scale[m],
+                square: self.innovation[m] * self.innovation[m],
+            }));
+        }
+    }
+}
+
 /// One stretch filtered.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Trace {
     pub(crate) instants: Vec<Instant>,
-    /// Sum over the used numbers of -(innovation^2 + log variance) / 2.
+    /// Sum over the used numbers of -(innovation^2 + log variance) / 2, or of what is likely of readings that may be cut.
     pub(crate) log_likelihood: f64,
     /// Step that the readings are rounded to, counts; 0 for none.
     pub(crate) step_counts: f64,
@@ -232,12 +246,7 @@ fn filtered(
             usable,
             i >= BURN_IN,
         );
-        let (mut squares, mut density) = (0.0, 1.0);
-        for m in (0..MEASURED).filter(|m| instant.used >> m & 1 == 1) {
-            squares += instant.innovation[m] * instant.innovation[m];
-            density *= instant.per_scale[m];
-        }
-        log_likelihood += density.ln() - 0.5 * squares;
+        log_likelihood += instant.likelihood.ln();
         each(instant);
         if !state.pose.position.x.is_finite() {
             return None;
@@ -279,6 +288,7 @@ fn step(
         look: Look::default(),
         innovation: [0.0; MEASURED],
         per_scale: [1.0; MEASURED],
+        likelihood: Likelihood::ONE,
         slope: [[0.0; 3]; MEASURED],
         gain: [[0.0; 3]; MEASURED],
         moved_from: state.pose,
@@ -330,6 +340,7 @@ fn see(forecast: &Forecast<'_>, state: &mut State, row: &LogRow, usable: Used, i
         instant.slope[m] = slopes[m];
         (instant.innovation[m], instant.per_scale[m], instant.gain[m]) =
             state.update(missed, slopes[m], noise);
+        instant.count(m, None);
     }
     state.settle();
 }
@@ -384,11 +395,17 @@ fn sense(
         if usable >> m & 1 == 0 {
             continue;
         }
+        // The likelihood of what may be cut, by all that is known before.
+        let cut_likelihood = (step_counts == 0.0 && read.open < 1.0).then(|| {
+            let moved: f64 = (0..3).map(|axis| slope[axis] * state.moved[axis]).sum();
+            likelihood_of_cut(row.readings[lane], mean + moved, deviation)
+        });
         let slope = slope.map(|s| s * read.open);
         let rest = (read.variance - pose_variance * read.open * read.open).max(1e-3 * read.variance);
         instant.slope[m] = slope;
         (instant.innovation[m], instant.per_scale[m], instant.gain[m]) =
             state.update(row.readings[lane] - read.mean, slope, rest);
+        instant.count(m, cut_likelihood);
     }
     state.settle();
 }

@@ -49,7 +49,61 @@ pub(crate) fn cut(mean: f64, deviation: f64, step: f64, declared: f64) -> Cut {
     }
 }
 
-/// The same for multiples k of a step, by the probabilities of reaching each.
+/// A number's part of a likelihood: its density, or the probability of a value that many have, times sqrt(2 pi), as a factor and the
+/// square in an exponential's exponent of -square / 2.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Likelihood {
+    pub(crate) factor: f64,
+    pub(crate) square: f64,
+}
+
+impl Likelihood {
+    pub(crate) const ONE: Self = Self {
+        factor: 1.0,
+        square: 0.0,
+    };
+
+    /// Both numbers'.
+    pub(crate) fn and(self, other: Self) -> Self {
+        Self {
+            factor: self.factor * other.factor,
+            square: self.square + other.square,
+        }
+    }
+
+    pub(crate) fn ln(self) -> f64 {
+        self.factor.ln() - 0.5 * self.square
+    }
+}
+
+/// The likelihood of a reading that is normal with this mean and standard deviation before it is cut to [0, inf) (Tobin 1958). That
+/// of the moments in its place is no longer greatest at the truth where most readings are 0.
+#[inline]
+pub(crate) fn likelihood_of_cut(reading: f64, mean: f64, deviation: f64) -> Likelihood {
+    /// Standard deviations below 0 from where on a mean is as good as any lower one: a reading that is not 0 after all is no
+    /// proof of the contrary.
+    const SHUT: f64 = 3.0;
+    let mean = mean.max(-SHUT * deviation);
+    if reading > 0.0 {
+        let z = (reading - mean) / deviation;
+        return Likelihood {
+            factor: 1.0 / deviation,
+            square: z * z,
+        };
+    }
+    // Most sensors see no wall.
+    let shut = if mean == 0.0 {
+        0.5
+    } else {
+        0.5 * erfc(mean / deviation * std::f64::consts::FRAC_1_SQRT_2)
+    };
+    Likelihood {
+        factor: shut * std::f64::consts::TAU.sqrt(),
+        square: 0.0,
+    }
+}
+
+/// The moments of [`cut`] for multiples k of a step, by the probabilities of reaching each.
 fn rounded(mean: f64, deviation: f64, step: f64, declared: f64) -> Cut {
     if step < 0.5 * deviation {
         // Sheppard's correction; the rounding of a finer step is as good as noise.
@@ -94,6 +148,26 @@ mod tests {
             shut.mean < 1e-9 && shut.variance > 0.1 && shut.open < 1e-9,
             "{shut:?}"
         );
+    }
+
+    #[test]
+    fn a_likelihood_of_cut_readings_sums_to_one_and_is_greatest_at_the_truth() {
+        const DEVIATION: f64 = 8.0;
+        const STEP: f64 = 1e-3;
+        let density = |reading: f64, mean: f64| {
+            likelihood_of_cut(reading, mean, DEVIATION).ln().exp() / std::f64::consts::TAU.sqrt()
+        };
+        // What is expected, over readings that have one mean, of something that depends on them.
+        let expected = |mean: f64, of: &dyn Fn(f64) -> f64| {
+            let above = (0..80_000).map(|i| (f64::from(i) + 0.5) * STEP);
+            density(0.0, mean) * of(0.0) + above.map(|y| STEP * density(y, mean) * of(y)).sum::<f64>()
+        };
+        for mean in [-20.0, -8.0, 0.0, 13.0] {
+            assert!((expected(mean, &|_| 1.0) - 1.0).abs() < 1e-6, "{mean}");
+            let at = |guess: f64| expected(mean, &|y| likelihood_of_cut(y, guess, DEVIATION).ln());
+            let slope = (at(mean + 0.01) - at(mean - 0.01)) / 0.02;
+            assert!(slope.abs() < 1e-6, "{mean}: {slope}");
+        }
     }
 
     #[test]
