@@ -1,5 +1,7 @@
 //! What might explain a residual.
 
+use std::ops::Range;
+
 use sim::{Param, Pattern, Setting, Stage, UNLISTED};
 
 use crate::Cause;
@@ -55,16 +57,33 @@ pub(crate) fn label(setting: &Setting) -> String {
     format!("{}{fixed}{pattern}", spec.name)
 }
 
-/// A value brought into its parameter's range: angles and places on a closed wall go round, others stop at the end.
+/// Where a parameter goes round: the range that holds each of its values once. Angles and places on a closed wall do.
+fn round(param: &Param) -> Option<Range<f64>> {
+    const PI: f64 = std::f64::consts::PI;
+    match param.name {
+        "position" => Some(0.0..1.0),
+        "azimuth_rad" => Some(-PI..PI),
+        _ => None,
+    }
+}
+
+/// A value brought into its parameter's range: what goes round goes on, others stop at the end.
 pub(crate) fn within(value: f64, param: &Param) -> f64 {
-    if param.name == "position" {
-        return value.rem_euclid(1.0);
+    match round(param) {
+        Some(turn) => (value - turn.start).rem_euclid(turn.end - turn.start) + turn.start,
+        None => value.clamp(param.low, param.high),
     }
-    if param.name == "azimuth_rad" {
-        let pi = std::f64::consts::PI;
-        return (value + pi).rem_euclid(2.0 * pi) - pi;
+}
+
+/// How far a value of a parameter is from another, the shorter way round.
+pub(crate) fn apart(value: f64, other: f64, param: &Param) -> f64 {
+    match round(param) {
+        Some(turn) => {
+            let period = turn.end - turn.start;
+            (value - other + 0.5 * period).rem_euclid(period) - 0.5 * period
+        }
+        None => value - other,
     }
-    value.clamp(param.low, param.high)
 }
 
 #[cfg(test)]
@@ -79,7 +98,13 @@ mod tests {
         let param = |name: &str| bump.params.iter().find(|param| param.name == name).unwrap();
         assert!((within(-0.005, param("position")) - 0.995).abs() < 1e-12);
         assert!((within(1.005, param("position")) - 0.005).abs() < 1e-12);
+        assert!((apart(0.01, 0.99, param("position")) - 0.02).abs() < 1e-12);
+        assert!((apart(0.99, 0.01, param("position")) + 0.02).abs() < 1e-12);
+        let azimuth = &find("floor-tilt").unwrap().params[1];
+        assert!((apart(-3.1, 3.1, azimuth) - (std::f64::consts::TAU - 6.2)).abs() < 1e-12);
+        assert!((apart(0.3, 0.1, azimuth) - 0.2).abs() < 1e-12);
         let height = param("height_m");
+        assert!((apart(0.9, 0.1, height) - 0.8).abs() < 1e-12);
         assert_eq!(within(height.high + 1.0, height), height.high);
     }
 }

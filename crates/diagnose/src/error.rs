@@ -34,12 +34,24 @@ pub enum Error {
         "the declared model does not complete its laps: nothing can be traced from it; look at `lapwing drive` with the same settings"
     )]
     DeclaredModelStops,
-    /// Too few simulated laps for the number of coordinates.
-    #[error("too few laps for the number of gates: more runs or more laps are needed")]
+    /// Runs that nothing can be told from.
+    #[error(
+        "every run needs at least three whole laps that pass all gates: measure more laps, or leave the run out"
+    )]
     TooFewLaps,
-    /// A robot that crashes or stops with the effects found.
-    #[error("with the effects found the simulated robot does not complete its laps")]
-    Crash,
+    /// Runs that are not those that the declared model was simulated for.
+    #[error("the declared model was simulated for runs of {expected:?} laps, and these have {found:?}")]
+    Shape {
+        /// Laps of each run that was simulated.
+        expected: Vec<usize>,
+        /// Laps of each run that was given.
+        found: Vec<usize>,
+    },
+    /// A declared model of which all laps are the same.
+    #[error(
+        "the laps of the declared model do not scatter, so that nothing is more than chance: give it slip, noise of readings or noise of the camera"
+    )]
+    NoScatter,
     /// Logs that cannot be followed.
     #[error(
         "no stretch of 200 control steps with commands and camera positions can be followed: at least one run needs one"

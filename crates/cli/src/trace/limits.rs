@@ -18,10 +18,9 @@ pub(crate) fn next_in_words(trace: &Trace) -> Option<String> {
         None => "more than ten such sets would be needed for 5 standard deviations".to_owned(),
     };
     Some(format!(
-        "To tell them apart: {} ({:.1} standard deviations expected of {} laps; {laps}); add them as a second --measured.",
+        "To tell them apart: {} ({}; {laps}); add them as a second --measured.",
         best.name,
-        best.least(),
-        best.laps
+        best.expectation()
     ))
 }
 

@@ -63,6 +63,8 @@ pub(crate) struct Trace {
 /// How far one recording's held-out runs are from the simulation.
 #[derive(Debug)]
 pub(crate) struct Errors {
+    /// Which of the recordings.
+    pub(crate) recording: usize,
     pub(crate) held_out: Vec<SampledRun>,
     pub(crate) before: MeanLaps,
     pub(crate) after: MeanLaps,
@@ -184,6 +186,12 @@ impl Trace {
         all.iter().sum::<f64>() / all.len() as f64
     }
 
+    /// The recording whose laps are drawn, and its errors: the first with held-out runs.
+    pub(crate) fn shown(&self) -> (&Recording, &Errors) {
+        let errors = &self.errors[0];
+        (&self.recordings[errors.recording], errors)
+    }
+
     /// All held-out runs.
     pub(crate) fn held_out(&self) -> impl Iterator<Item = &SampledRun> {
         self.errors.iter().flat_map(|errors| &errors.held_out)
@@ -215,7 +223,7 @@ fn remarks(recordings: &[Recording]) -> Vec<String> {
     remarks
 }
 
-/// The first recording with logs, and they.
+/// The first recording of which all runs have a log, and its logs.
 fn with_logs(recordings: &[Recording]) -> Option<(usize, Vec<Vec<diagnose::LogRow>>)> {
     (recordings.iter().enumerate())
         .find_map(|(place, recording)| log_rows(&recording.measured.set).map(|rows| (place, rows)))
@@ -272,6 +280,7 @@ fn errors(
             }
         };
         all.push(Errors {
+            recording: place,
             before_m,
             floor_m: held_out.iter().map(|run| after.floor_m(run.laps.len())).collect(),
             held_out,

@@ -18,6 +18,8 @@ const LAPS: usize = 8;
 const LOGGED_LAPS: usize = 3;
 /// Standard deviations at which two explanations are told apart.
 const ENOUGH: f64 = 5.0;
+/// Standard deviations that stand for certainty.
+const CERTAIN: f64 = 1e3;
 /// Rivals that are looked at.
 const RIVALS: usize = 3;
 
@@ -41,6 +43,19 @@ impl Experiment {
             .iter()
             .map(|(_, s)| *s)
             .fold(f64::INFINITY, f64::min)
+    }
+
+    /// What it is expected to tell, in words.
+    pub(crate) fn expectation(&self) -> String {
+        if self.least() >= CERTAIN {
+            format!("certain with {} laps", self.laps)
+        } else {
+            format!(
+                "{:.1} standard deviations expected of {} laps",
+                self.least(),
+                self.laps
+            )
+        }
     }
 
     /// Laps that tell the answer from every rival; `None` if that would take too many.
@@ -163,9 +178,12 @@ fn by_laps(
         })
         .collect();
     let found = separations(&simulate, &first_runs(&answer.settings()), &rivals)?;
-    Some(named(others, found))
+    // A rival with which the robot crashes is told apart by the first lap.
+    let found = found.into_iter().map(|sigmas| sigmas.unwrap_or(CERTAIN));
+    Some(named(others, found.collect()))
 }
 
+/// `None` if logs cannot be simulated, or followed: what they would tell is not known.
 fn by_logs(
     setup: &Setup,
     answer: &Explanation,
@@ -178,29 +196,18 @@ fn by_logs(
     let decides = |e: &Explanation| e.effects.iter().any(|c| c.stage() == Stage::Decide);
     let separation = |other: &&Explanation| {
         if decides(answer) != decides(other) {
-            return None;
+            return Some(CERTAIN);
         }
-        log_separation(
-            &setup.model,
-            &setup.scene,
-            &runs,
-            &answer.settings(),
-            &other.settings(),
-        )
+        let [answer, other] = [answer, *other].map(|e| first_runs(&e.settings()));
+        log_separation(&setup.model, &setup.scene, &runs, &answer, &other)
     };
-    let found = others.iter().map(separation).collect();
+    let found = others.iter().map(separation).collect::<Option<_>>()?;
     Some(named(others, found))
 }
 
-fn named(others: &[&Explanation], found: Vec<Option<f64>>) -> Vec<(String, f64)> {
-    // A rival with which the robot crashes is told apart by the first lap.
-    const CERTAIN: f64 = 1e3;
+fn named(others: &[&Explanation], found: Vec<f64>) -> Vec<(String, f64)> {
     let name = |other: &&Explanation| other.names().join(" + ");
-    others
-        .iter()
-        .map(name)
-        .zip(found.into_iter().map(|s| s.unwrap_or(CERTAIN)))
-        .collect()
+    others.iter().map(name).zip(found).collect()
 }
 
 /// Simulated logs of a robot with effects.

@@ -135,11 +135,11 @@ fn unexplained(trace: &Trace) -> String {
 /// The mean laps gate by gate as CSV, recording by recording.
 pub(crate) fn gates_csv(trace: &Trace) -> String {
     let mut csv = String::from("data_set,gate,measured_m,before_m,after_m\n");
-    for (recording, errors) in trace.recordings.iter().zip(&trace.errors) {
+    for errors in &trace.errors {
         let laps: Vec<Vec<f64>> = errors.held_out.iter().flat_map(SampledRun::offsets_m).collect();
         for (gate, measured) in mean(laps.iter()).unwrap_or_default().iter().enumerate() {
             let (before, after) = (errors.before.mean_m[gate], errors.after.mean_m[gate]);
-            let name = &recording.measured.set.name;
+            let name = &trace.recordings[errors.recording].measured.set.name;
             csv += &format!("{name},{gate},{measured:.6},{before:.6},{after:.6}\n");
         }
     }
@@ -216,10 +216,10 @@ fn error_table(trace: &Trace) -> Table {
         &["", "before", "after", "chance"],
     );
     let mm = |m: f64| format!("{:.2}", MM * m);
-    for (errors, recording) in trace.errors.iter().zip(&trace.recordings) {
+    for errors in &trace.errors {
         let of = match trace.errors.len() {
             1 => String::new(),
-            _ => format!("{}: ", recording.measured.set.name),
+            _ => format!("{}: ", trace.recordings[errors.recording].measured.set.name),
         };
         let mean_mm = |values: &[f64]| mm(values.iter().sum::<f64>() / values.len() as f64);
         table.push([

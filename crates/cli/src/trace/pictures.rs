@@ -3,13 +3,14 @@
 use chart::{Axis, Color, Dash, Figure, Interval, Mark, Shape, Style};
 use track::Lap;
 
+use super::recording::Recording;
 use super::{MeanLaps, Trace, mean};
 use crate::figures::{MM, across, colored_path, crossings, line, map, single, walls};
 use crate::laps::SampledRun;
 
-/// The mean of all measured laps of the first recording, gate by gate, m.
-fn mean_measured(trace: &Trace) -> Vec<f64> {
-    let laps: Vec<Vec<f64>> = trace.recordings[0]
+/// The mean of all measured laps of a recording, gate by gate, m.
+fn mean_measured(recording: &Recording) -> Vec<f64> {
+    let laps: Vec<Vec<f64>> = recording
         .measured
         .runs
         .iter()
@@ -20,12 +21,13 @@ fn mean_measured(trace: &Trace) -> Vec<f64> {
 
 /// Where on the circuit the residual sits.
 pub(super) fn residual_map(trace: &Trace) -> Figure {
-    let circuit = trace.recordings[0].setup.scene.circuit();
-    let measured = mean_measured(trace);
+    let (recording, errors) = trace.shown();
+    let circuit = recording.setup.scene.circuit();
+    let measured = mean_measured(recording);
     let mut points = crossings(circuit, &measured);
     let mut values: Vec<f64> = measured
         .iter()
-        .zip(&trace.errors[0].before.mean_m)
+        .zip(&errors.before.mean_m)
         .map(|(m, s)| MM * (m - s))
         .collect();
     points.push(points[0]);
@@ -41,8 +43,8 @@ pub(super) fn residual_map(trace: &Trace) -> Figure {
 
 /// Mean laps, and below them what is left of the measured one.
 pub(super) fn mean_laps(trace: &Trace) -> Figure {
-    let measured = mean_measured(trace);
-    let errors = &trace.errors[0];
+    let (recording, errors) = trace.shown();
+    let measured = mean_measured(recording);
     let declared = line(Color::VERMILLION, Dash::Dashed, 1.6);
     let answer = line(Color::BLUE, Dash::Solid, 1.6);
     let left = |laps: &MeanLaps| -> Vec<f64> {
@@ -59,7 +61,7 @@ pub(super) fn mean_laps(trace: &Trace) -> Figure {
         low: -1.96 * MM * error_m,
         high: 1.96 * MM * error_m,
     };
-    let shape = trace.recordings[0].shape();
+    let shape = recording.shape();
     let errors_m = errors.after.standard_error_m(&shape);
     let chance = errors_m.into_iter().enumerate().map(band).collect();
     let style = Style::color(Color::INK);
@@ -87,14 +89,15 @@ pub(super) fn mean_laps(trace: &Trace) -> Figure {
 
 /// Laps before and after over measured ones.
 pub(super) fn laps(trace: &Trace) -> Figure {
-    let circuit = trace.recordings[0].setup.scene.circuit();
+    let (recording, errors) = trace.shown();
+    let circuit = recording.setup.scene.circuit();
     let mut marks = vec![walls(&circuit.course)];
     let closed = |offsets: &[f64]| {
         let mut points = crossings(circuit, offsets);
         points.extend([points[0], chart::GAP]);
         points
     };
-    let measured_laps: Vec<[f64; 2]> = trace.recordings[0]
+    let measured_laps: Vec<[f64; 2]> = recording
         .measured
         .runs
         .iter()
@@ -121,12 +124,12 @@ pub(super) fn laps(trace: &Trace) -> Figure {
     marks.push(Mark::new(
         "declared model",
         style(Color::VERMILLION),
-        Shape::Line(few(&trace.errors[0].before)),
+        Shape::Line(few(&errors.before)),
     ));
     marks.push(Mark::new(
         "with the answer",
         style(Color::BLUE),
-        Shape::Line(few(&trace.errors[0].after)),
+        Shape::Line(few(&errors.after)),
     ));
     single(
         "Laps before and after",

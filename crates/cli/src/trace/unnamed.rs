@@ -43,10 +43,11 @@ pub(super) fn unnamed(trace: &Trace) -> Option<Block> {
 }
 
 fn on_floor(trace: &Trace, coefficients: &[f64], label: String) -> Figure {
-    let circuit = trace.recordings[0].setup.scene.circuit();
+    let (recording, errors) = trace.shown();
+    let circuit = recording.setup.scene.circuit();
     let [width_m, height_m] = circuit.course.arena_m;
     let middle = Vec2::new(0.5 * width_m, 0.5 * height_m);
-    let mut points = crossings(circuit, &trace.errors[0].before.mean_m);
+    let mut points = crossings(circuit, &errors.before.mean_m);
     points.push(points[0]);
     let values: Vec<f64> = (points.iter())
         .map(|[x, y]| unlisted_on_floor(coefficients, Vec2::new(*x, *y) - middle))
@@ -56,8 +57,10 @@ fn on_floor(trace: &Trace, coefficients: &[f64], label: String) -> Figure {
 }
 
 fn curve(trace: &Trace, coefficients: &[f64], variable: &str, label: String) -> Figure {
-    let machine = &trace.recordings[0].setup.model.machine;
-    let run_s = trace.errors[0].before.lap_s * 20.0;
+    let (recording, errors) = trace.shown();
+    let machine = &recording.setup.model.machine;
+    let laps = recording.shape().into_iter().max().unwrap_or(1);
+    let run_s = errors.before.lap_s * laps as f64;
     let (axis, low, high) = match variable {
         "heading" => ("heading, rad", -TAU / 2.0, TAU / 2.0),
         "gate" => ("place along the lap, rad", 0.0, TAU),

@@ -129,7 +129,7 @@ impl Atlas {
         let mean_laps = laps.iter().sum::<usize>() as f64 / laps.len() as f64;
         let scatter = Scatter::of(null.iter().map(|summary| &summary.0[0]))
             .and_then(|scatter| scatter.left_open(&directions, mean_laps))
-            .ok_or(Error::TooFewLaps)?;
+            .ok_or(Error::NoScatter)?;
         let mut atlas = Self {
             samples: null.iter().map(observed).collect(),
             layout: Layout {
@@ -272,15 +272,15 @@ impl Atlas {
         self.layout.laps[0][0]
     }
 
-    /// Whether data have the shape that the atlas was made for, run by run.
+    /// What data say, if they have the shape that the atlas was made for, run by run.
     pub(super) fn observed(&self, runs: &[Vec<ObservedLap>]) -> Result<Expectation, Error> {
         let counts: Vec<usize> = self.layout.laps.iter().map(Vec::len).collect();
-        let shaped = runs
-            .iter()
-            .map(Vec::len)
-            .eq(self.layout.laps.iter().flatten().copied());
-        let summary = Summary::new(runs, &counts).filter(|_| shaped);
-        Ok(observed(&summary.ok_or(Error::TooFewLaps)?))
+        let expected = self.layout.laps.concat();
+        let found: Vec<usize> = runs.iter().map(Vec::len).collect();
+        if found != expected {
+            return Err(Error::Shape { expected, found });
+        }
+        Ok(observed(&Summary::new(runs, &counts).ok_or(Error::TooFewLaps)?))
     }
 
     /// What the data say without one run, which is one of several of its recording.

@@ -163,18 +163,19 @@ impl Atlas {
             .flat_map(|&probe| (0..self.probes[probe].free.len()).map(move |i| (probe, i)))
             .collect();
         let actions = self.actions(simulate, &jobs, GROUP_SETS);
+        // A group of which a part stops the robot has no sizes.
         let fitted = |&probe: &usize| {
-            let columns: Vec<&White> = (jobs.iter().zip(&actions))
-                .filter(|((p, _), action)| *p == probe && action.is_some())
-                .filter_map(|(_, action)| action.as_ref())
-                .collect();
+            let columns = (jobs.iter().zip(&actions))
+                .filter(|((p, _), _)| *p == probe)
+                .map(|(_, action)| action.as_ref())
+                .collect::<Option<Vec<&White>>>()?;
             let (multiples, gain) = solve(&columns, residual);
             let count = columns.len();
             let part = Part::group(&self.probes[probe], probe, multiples.as_slice());
             let score = gain - price(count, self.layout.total_laps());
-            (score, count, Hypothesis::of(part))
+            Some((score, count, Hypothesis::of(part)))
         };
-        groups.iter().map(fitted).collect()
+        groups.iter().filter_map(fitted).collect()
     }
 
     /// What settles like this and explains a residual best at the sizes that linear algebra gives, target by target.
@@ -209,7 +210,7 @@ impl Atlas {
 fn solve(columns: &[&White], target: &White) -> (DVector<f64>, f64) {
     let count = columns.len();
     let normal = DMatrix::from_fn(count, count, |i, j| {
-        // Each column's own noise, which is a share of its number of entries, must not count as signal.
+        // A little more on the diagonal keeps columns that are alike from having no solution.
         columns[i].dot(columns[j]) * if i == j { 1.0 + 1e-6 } else { 1.0 }
     });
     let right = DVector::from_fn(count, |i, _| columns[i].dot(target));

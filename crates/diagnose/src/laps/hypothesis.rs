@@ -6,7 +6,7 @@ use super::atlas::Atlas;
 use super::probe::Probe;
 use super::screen::{at, worth};
 use super::tests_of_fit::Quadratic;
-use crate::candidate::within;
+use crate::candidate::{apart, within};
 
 /// How an effect goes over the runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -224,7 +224,12 @@ impl Part {
                 .find(|free| free.0 == i)
                 .map_or(0.0, |free| free.1)
         };
-        let near = |i: usize| (self.values[0][i] - other.values[0][i]).abs() <= step(i);
+        let off = |i: usize| {
+            let (value, other) = (self.values[0][i], other.values[0][i]);
+            let param = probe.spec.params.get(i);
+            param.map_or(value - other, |param| apart(value, other, param))
+        };
+        let near = |i: usize| off(i).abs() <= step(i);
         probe.spec == atlas.probes[other.probe].spec
             && [self.shape, other.shape] == [Shape::Constant; 2]
             && self.values[0].len() == other.values[0].len()
@@ -557,6 +562,14 @@ impl Hypothesis {
         freedom
             .parameter
             .map_or(part.per_s, |i| part.values[freedom.run.unwrap_or(0)][i])
+    }
+
+    /// How far one number is from what it is in another hypothesis of the same parts.
+    pub(super) fn apart(&self, other: &Self, freedom: &Freedom, atlas: &Atlas) -> f64 {
+        let (value, other) = (self.get(freedom), other.get(freedom));
+        let spec = atlas.probes[self.parts[freedom.part].probe].spec;
+        let param = freedom.parameter.and_then(|i| spec.params.get(i));
+        param.map_or(value - other, |param| apart(value, other, param))
     }
 
     /// This hypothesis with some numbers moved; each stays in its parameter's range.

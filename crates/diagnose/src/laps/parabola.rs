@@ -27,7 +27,7 @@ impl Atlas {
             let at = |sign: f64| {
                 let moves: Vec<(Freedom, f64)> = group.iter().map(|f| (*f, sign * f.step)).collect();
                 let moved = hypothesis.moved(self, &moves);
-                let by: Vec<f64> = group.iter().map(|f| moved.get(f) - hypothesis.get(f)).collect();
+                let by: Vec<f64> = group.iter().map(|f| moved.apart(hypothesis, f, self)).collect();
                 self.evaluate(simulate, &moved, sets)
                     .map(|evaluated| (by, evaluated))
             };

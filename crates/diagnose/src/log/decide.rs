@@ -107,17 +107,13 @@ pub(crate) fn decided(model: &Model, runs: &[&[LogRow]]) -> Decided {
     };
     let speed = controller.speed_m_s();
     let changed: Vec<Candidate> = [
-        candidate("controller-gain", &found, |run| {
-            (
-                run.parameter.map(|p| p / parameter),
-                run.parameter_error / parameter,
-            )
+        candidate("controller-gain", &found, |run| Relative {
+            line: run.parameter.map(|p| p / parameter),
+            error: run.parameter_error / parameter,
         }),
-        candidate("controller-speed", &found, |run| {
-            (
-                run.speed_m_s.map(|v| v / speed),
-                SPEED_ROUNDING_M_S / speed * 0.05,
-            )
+        candidate("controller-speed", &found, |run| Relative {
+            line: run.speed_m_s.map(|v| v / speed),
+            error: SPEED_ROUNDING_M_S / speed * 0.05,
         }),
     ]
     .into_iter()
@@ -322,46 +318,58 @@ fn line(points: impl Iterator<Item = (f64, f64, f64)>, sloped: bool) -> Line {
     ]
 }
 
-/// The effect with its factor as it goes over the runs; `None` where it is 1 in all of them.
+/// A run's constant relative to the declared one.
+#[derive(Debug, Clone, Copy)]
+struct Relative {
+    line: Line,
+    /// Standard error at the run's start.
+    error: f64,
+}
+
+/// The effect with its factor as it goes over the runs; `None` where it is 1 in all of them. A run of which the log tells nothing
+/// has the mean of the others'.
 fn candidate(
     name: &str,
     runs: &[Option<Constants>],
-    factor: impl Fn(&Constants) -> (Line, f64),
+    factor: impl Fn(&Constants) -> Relative,
 ) -> Option<Candidate> {
-    let factors: Vec<(Line, f64)> = runs
-        .iter()
-        .map(|run| run.as_ref().map_or(([1.0, 0.0], 0.0), &factor))
-        .collect();
+    /// A run's usual length, s, and the change over it that is seen.
+    const RUN_S: f64 = 300.0;
+    const DRIFTS: f64 = 5e-3;
+    let factors: Vec<Option<Relative>> = runs.iter().map(|run| run.as_ref().map(&factor)).collect();
+    let told: Vec<Relative> = factors.iter().flatten().copied().collect();
+    let first = told.first()?;
     let beyond = |value: f64, error: f64| value.abs() > SAME.max(4.0 * error);
-    let slopes = factors.iter().any(|(line, _)| line[1].abs() * 300.0 > 5e-3);
-    if !slopes && !factors.iter().any(|(line, error)| beyond(line[0] - 1.0, *error)) {
+    let slopes = told.iter().any(|run| run.line[1].abs() * RUN_S > DRIFTS);
+    if !slopes && !told.iter().any(|run| beyond(run.line[0] - 1.0, run.error)) {
         return None;
     }
-    let count = factors.len() as f64;
-    let mean = |i: usize| factors.iter().map(|(line, _)| line[i]).sum::<f64>() / count;
-    let differ = factors
-        .iter()
-        .any(|(line, error)| beyond(line[0] - factors[0].0[0], 2.0 * *error));
-    let error = factors
-        .iter()
-        .map(|(_, error)| error)
-        .fold(0.0, |a: f64, b| a.max(*b));
+    let mean = |i: usize| told.iter().map(|run| run.line[i]).sum::<f64>() / told.len() as f64;
+    let start = mean(0);
+    let differ = (told.iter()).any(|run| beyond(run.line[0] - first.line[0], 2.0 * run.error));
+    let error = told.iter().map(|run| run.error).fold(0.0, f64::max);
     let spec = find(name).ok()?;
     let (pattern, standard_errors) = if slopes {
         (
             Pattern::ByTime {
-                start: vec![mean(0)],
+                start: vec![start],
                 per_s: vec![mean(1)],
             },
-            vec![error, error / 300.0],
+            vec![error, error / RUN_S],
         )
     } else if differ {
+        let square = |run: &Relative| (run.line[0] - start).powi(2) + run.error * run.error;
+        let unseen = Relative {
+            line: [start, 0.0],
+            error: (told.iter().map(square).sum::<f64>() / told.len() as f64).sqrt(),
+        };
+        let each = || factors.iter().map(|run| run.unwrap_or(unseen));
         (
-            Pattern::ByRun(factors.iter().map(|(line, _)| vec![line[0]]).collect()),
-            factors.iter().map(|(_, e)| *e).collect(),
+            Pattern::ByRun(each().map(|run| vec![run.line[0]]).collect()),
+            each().map(|run| run.error).collect(),
         )
     } else {
-        (Pattern::Constant(vec![mean(0)]), vec![error])
+        (Pattern::Constant(vec![start]), vec![error])
     };
     let fitted = standard_errors.len();
     Some(Candidate {
@@ -387,6 +395,33 @@ mod tests {
             left_m_s: if turns { -SPEED_M_S } else { SPEED_M_S },
             right_m_s: SPEED_M_S,
         }
+    }
+
+    #[test]
+    fn a_run_without_readings_tells_nothing_of_a_factor() {
+        let of = |gain: f64| {
+            Some(Constants {
+                speed_m_s: [0.05, 0.0],
+                parameter: [gain, 0.0],
+                parameter_error: 1e-6,
+                missed: 0.0,
+            })
+        };
+        let factors = |runs: &[Option<Constants>]| {
+            let factor = |run: &Constants| Relative {
+                line: run.parameter,
+                error: run.parameter_error,
+            };
+            candidate("controller-gain", runs, factor).map(|found| found.setting.pattern)
+        };
+        assert_eq!(
+            factors(&[of(1.2), None, of(1.2)]),
+            Some(Pattern::Constant(vec![1.2]))
+        );
+        let by_run = Pattern::ByRun(vec![vec![1.25], vec![1.0], vec![1.5]]);
+        assert_eq!(factors(&[None, of(1.0), of(1.5)]), Some(by_run));
+        assert_eq!(factors(&[None, of(1.0)]), None);
+        assert_eq!(factors(&[None]), None);
     }
 
     #[test]

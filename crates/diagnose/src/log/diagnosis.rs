@@ -158,7 +158,7 @@ impl Search<'_> {
             self.unlisted.as_ref().map(|unnamed| unnamed.cause.clone())
         };
         let indistinguishable = indistinguishable(explanations.iter(), ALTERNATIVE);
-        let runs = self.evidence.runs().last().map_or(0, |last| last + 1);
+        let runs = self.evidence.measured_runs;
         let mut answer = Answer {
             verdict,
             explanations,

@@ -25,6 +25,8 @@ pub(crate) struct Evidence<'a> {
     pub(crate) scene: &'a Scene,
     pub(crate) model: &'a Model,
     pub(crate) stretches: Vec<Stretch<'a>>,
+    /// Runs that were measured, with evidence or without.
+    pub(crate) measured_runs: usize,
     /// Step that the readings are rounded to, counts; 0 for none.
     pub(crate) step_counts: f64,
 }
@@ -119,6 +121,7 @@ impl<'a> Evidence<'a> {
             scene,
             model,
             stretches: stretches.into_iter().flatten().collect(),
+            measured_runs: runs.len(),
             step_counts,
         })
     }
@@ -168,6 +171,7 @@ impl<'a> Evidence<'a> {
             scene,
             model: self.model,
             stretches,
+            measured_runs: self.measured_runs,
             step_counts: self.step_counts,
         }
     }

@@ -368,6 +368,8 @@ fn sense(
     usable: Used,
     instant: &mut Instant,
 ) {
+    // Readings are written to 0.1 counts.
+    const ROUNDING_COUNTS2: f64 = 1e-2 / 12.0;
     (instant.look, instant.uncut) = (outlook.look, outlook.mean);
     let noise = forecast.machine().noise;
     let mut slopes = outlook.slope;
@@ -383,7 +385,7 @@ fn sense(
         let pose_variance: f64 = (0..3)
             .map(|i| slope[i] * (p[i][0] * slope[0] + p[i][1] * slope[1] + p[i][2] * slope[2]))
             .sum();
-        let own_variance = noise.deviation(mean).powi(2) + outlook.edge_variance[lane];
+        let own_variance = noise.deviation(mean).powi(2) + ROUNDING_COUNTS2 + outlook.edge_variance[lane];
         let deviation = (own_variance + pose_variance).sqrt();
         let read = cut(
             mean,

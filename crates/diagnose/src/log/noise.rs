@@ -70,8 +70,6 @@ pub(crate) fn p_among_repeats(
 ) -> f64 {
     /// Log-likelihood that no fault of the filter gains.
     const SURE: f64 = 50.0;
-    /// Simulated logs that tell a scatter.
-    const FEW: usize = 4;
     let of_factor = |factor: &Factor| {
         let p = factor.p();
         if p >= level || factor.gain > SURE && evidence.step_counts == 0.0 {
@@ -85,19 +83,23 @@ pub(crate) fn p_among_repeats(
                     .middle,
             )
         });
-        if logs.len() < FEW {
-            return p;
-        }
-        p.max(FACTORS * p_among(factor.middle, &logs)).min(1.0)
+        p_among(factor.middle, &logs).map_or(p, |among| p.max(FACTORS * among).min(1.0))
     };
     noise.iter().map(of_factor).fold(1.0, f64::min)
 }
 
-/// Probability that a further normal number is as far from the mean of some as this one is, on either side.
-pub(crate) fn p_among(number: f64, others: &[f64]) -> f64 {
+/// Probability that a further normal number is as far from the mean of some as this one is, on either side; `None` of too few, or
+/// of numbers that do not scatter.
+pub(crate) fn p_among(number: f64, others: &[f64]) -> Option<f64> {
+    /// Numbers that tell a scatter.
+    const FEW: usize = 4;
     let n = others.len() as f64;
     let error = (others.variance() * (1.0 + 1.0 / n)).sqrt();
-    StudentsT::new(0.0, 1.0, n - 1.0).map_or(1.0, |law| 2.0 * law.sf((number - others.mean()).abs() / error))
+    if others.len() < FEW || error.is_nan() || error <= 0.0 {
+        return None;
+    }
+    let law = StudentsT::new(0.0, 1.0, n - 1.0).ok()?;
+    Some(2.0 * law.sf((number - others.mean()).abs() / error))
 }
 
 /// Factors that are tried, each upwards and downwards (Bonferroni).
@@ -255,8 +257,10 @@ mod tests {
     fn a_number_among_others_is_judged_by_student_s_law() {
         // Mean 0 and variance 1 of five: t = 2.776 sqrt(1 + 1/5) is their 95 % bound with four degrees of freedom.
         let others = [-1.0, -1.0, 0.0, 1.0, 1.0];
-        assert!((p_among(2.776 * 1.2_f64.sqrt(), &others) - 0.05).abs() < 1e-4);
-        assert!((p_among(0.0, &others) - 1.0).abs() < 1e-12);
+        assert!((p_among(2.776 * 1.2_f64.sqrt(), &others).unwrap() - 0.05).abs() < 1e-4);
+        assert!((p_among(0.0, &others).unwrap() - 1.0).abs() < 1e-12);
+        assert_eq!(p_among(0.0, &others[..3]), None);
+        assert_eq!(p_among(0.0, &[1.0; 8]), None);
     }
 
     #[test]

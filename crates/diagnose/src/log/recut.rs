@@ -34,8 +34,9 @@ pub(crate) fn recut(
     let first = evidence.of_run(*evidence.runs().first()?);
     let mut tried: Vec<(f64, Corners, Scene)> = Vec::new();
     for (corners, scene) in cuts(scene, wide, &PER_SPAN) {
-        let likelihood = first.elsewhere(&scene).likelihood(settings)?;
-        tried.push((likelihood, corners, scene));
+        if let Some(likelihood) = first.elsewhere(&scene).likelihood(settings) {
+            tried.push((likelihood, corners, scene));
+        }
     }
     let Some((_, corners, scene)) = tried.into_iter().max_by(|a, b| a.0.total_cmp(&b.0)) else {
         return Some(as_declared);

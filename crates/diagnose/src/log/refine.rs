@@ -52,6 +52,15 @@ pub(crate) fn knobs(variant: &Variant, setting: usize, pattern: &Pattern) -> Vec
     flat.collect()
 }
 
+/// The values of settings that a refinement may change: not those that jump or go by run.
+pub(crate) fn knobs_of(settings: &[Setting], variants: &[Variant]) -> Vec<Knob> {
+    (settings.iter().enumerate())
+        .filter(|(_, setting)| !jumps(setting) && !matches!(setting.pattern, Pattern::ByRun(_)))
+        .filter_map(|(i, setting)| Some(knobs(Variant::of(setting, variants)?, i, &setting.pattern)))
+        .flatten()
+        .collect()
+}
+
 /// Whether an effect's derivative says nothing about its size: it jumps.
 pub(crate) fn jumps(setting: &Setting) -> bool {
     matches!(

@@ -9,8 +9,9 @@ use super::catalogue::Variant;
 use super::evidence::{Assessment, Evidence, Knob};
 use super::leads::{By, Lead, price, trusted};
 use super::noise::{factor_again, is_noise};
-use super::refine::{Fitted, hunt, jumps, knobs, one_step, refine};
+use super::refine::{Fitted, hunt, jumps, knobs, knobs_of, one_step, refine};
 use super::repeat::repeats;
+use crate::candidate::apart;
 
 /// A candidate with its best values and their pattern.
 #[derive(Debug, Clone)]
@@ -48,16 +49,9 @@ impl Refined {
         }
     }
 
-    /// The values that a refinement may change: not those that jump or go by run.
+    /// See [`knobs_of`].
     fn knobs(&self, variants: &[Variant]) -> Vec<Knob> {
-        (self.settings.iter().enumerate())
-            .filter(|(_, setting)| !jumps(setting) && !matches!(setting.pattern, Pattern::ByRun(_)))
-            .filter_map(|(i, setting)| {
-                let variant = Variant::of(setting, variants)?;
-                Some(knobs(variant, i, &setting.pattern))
-            })
-            .flatten()
-            .collect()
+        knobs_of(&self.settings, variants)
     }
 
     /// The settings fitted again to other evidence, from where they are; those that jump or go by run stay.
@@ -110,7 +104,11 @@ impl Refined {
         });
         for (i, (setting, errors)) in self.settings.iter().zip(&mut self.standard_errors).enumerate() {
             for (j, (value, error)) in numbers(setting).iter().zip(errors).enumerate() {
-                let square = |fit: &Vec<Setting>| (numbers(&fit[i])[j] - value).powi(2);
+                let off = |fitted: f64| match setting.spec.params.get(j) {
+                    Some(param) => apart(fitted, *value, param),
+                    None => fitted - value,
+                };
+                let square = |fit: &Vec<Setting>| off(numbers(&fit[i])[j]).powi(2);
                 let mean = fits.iter().map(square).sum::<f64>() / fits.len() as f64;
                 if *error > 0.0 {
                     *error = error.max(mean.sqrt());
@@ -168,7 +166,7 @@ pub(crate) fn pursue(
                     follow(&evidence.of_run(run), variant, setting, steps)
                 })
                 .collect::<Option<Vec<_>>>()?;
-            Some(by_runs(evidence, variant, &runs, &parts, base))
+            by_runs(evidence, variant, &runs, &parts, base)
         }
     }
 }
@@ -228,32 +226,46 @@ fn spread_errors(setting: &Setting, number: usize, fitted: &Fitted) -> Vec<f64> 
     errors
 }
 
+/// One candidate of what was fitted to each run alone. Runs of which the log does not tell the size have the mean of the others',
+/// with an error that holds how far these are apart; `None` if none of them tells it.
 fn by_runs(
     evidence: &Evidence<'_>,
     variant: &Variant,
     runs: &[usize],
     parts: &[Fitted],
     base: &[f64],
-) -> Refined {
-    let mut values = vec![variant.values.clone(); runs.last().map_or(0, |last| last + 1)];
-    let mut errors = Vec::new();
-    for (&run, part) in runs.iter().zip(parts) {
-        if let Pattern::Constant(found) = &part.settings[0].pattern {
-            values[run].clone_from(found);
-        }
-        errors.extend(spread_errors(&part.settings[0], 0, part));
+) -> Option<Refined> {
+    let errors_of = |part: &Fitted| spread_errors(&part.settings[0], 0, part);
+    let told: Vec<(usize, Vec<f64>, Vec<f64>)> = (runs.iter().zip(parts))
+        .map(|(&run, part)| (run, numbers(&part.settings[0]), errors_of(part)))
+        .filter(|(.., errors)| errors.iter().all(|error| error.is_finite()))
+        .collect();
+    let (_, first, _) = told.first()?;
+    let count = told.len() as f64;
+    let mean = |i: usize| told.iter().map(|(_, values, _)| values[i]).sum::<f64>() / count;
+    let means: Vec<f64> = (0..first.len()).map(mean).collect();
+    let error = |i: usize| {
+        let square = |(_, values, errors): &(usize, Vec<f64>, Vec<f64>)| {
+            (values[i] - means[i]).powi(2) + errors[i] * errors[i]
+        };
+        (told.iter().map(square).sum::<f64>() / count).sqrt()
+    };
+    let mut values = vec![means.clone(); evidence.measured_runs];
+    let mut errors = vec![(0..first.len()).map(error).collect::<Vec<f64>>(); evidence.measured_runs];
+    for (run, own_values, own_errors) in &told {
+        values[*run].clone_from(own_values);
+        errors[*run].clone_from(own_errors);
     }
-    let base: f64 = (evidence.stretches.iter().zip(base)).map(|(_, base)| base).sum();
-    Refined {
+    Some(Refined {
         settings: vec![Setting {
             spec: variant.spec,
             pattern: Pattern::ByRun(values),
         }],
-        standard_errors: vec![errors],
-        gain: parts.iter().map(|part| part.log_likelihood).sum::<f64>() - base,
+        standard_errors: vec![errors.concat()],
+        gain: parts.iter().map(|part| part.log_likelihood).sum::<f64>() - base.iter().sum::<f64>(),
         fitted: parts.iter().map(|part| part.knobs.len()).sum(),
         by: By::Run,
-    }
+    })
 }
 
 /// Refines several settings together from where each of them was best alone.

@@ -155,7 +155,7 @@ impl<'a> Search<'a> {
         let logs = repeats(&self.evidence, &[], |repeated| {
             Some(most_left(repeated, &[], &best)?.max(LEAST).ln())
         });
-        p.max(p_among(most(leads).max(LEAST).ln(), &logs))
+        p_among(most(leads).max(LEAST).ln(), &logs).map_or(p, |among| p.max(among))
     }
 
     /// The leads refined: a few steps each, then to the end those that may still be the best.

@@ -2,10 +2,11 @@
 
 use std::sync::Arc;
 
-use sim::{Model, Pattern, Scene, Setting};
+use sim::{Model, Scene, Setting};
 
 use super::evidence::Evidence;
-use super::refine::{jumps, knobs, refine};
+use super::groups::unlisted_variants;
+use super::refine::{knobs_of, refine};
 use super::rows::LogRow;
 
 /// The distance in standard deviations, for these logs of a robot with the answer's effects, between the answer and a rival that
@@ -25,15 +26,8 @@ pub fn log_separation(
     true_model.effects.extend_from_slice(answer);
     let masks = Evidence::new(&scene, &true_model, runs, 0.0).ok()?;
     let evidence = Evidence { model, ..masks };
-    let variants = evidence.variants();
-    let knobs = (rival.iter().enumerate())
-        .filter(|(_, setting)| !jumps(setting) && !matches!(setting.pattern, Pattern::ByRun(_)))
-        .filter_map(|(i, setting)| {
-            let variant = variants.iter().find(|variant| variant.spec == setting.spec)?;
-            Some(knobs(variant, i, &setting.pattern))
-        })
-        .flatten()
-        .collect();
+    let variants = [evidence.variants(), unlisted_variants()].concat();
+    let knobs = knobs_of(rival, &variants);
     let best = refine(&evidence, rival.to_vec(), knobs, STEPS)?.log_likelihood;
     Some((2.0 * (evidence.likelihood(answer)? - best).max(0.0)).sqrt())
 }
