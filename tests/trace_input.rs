@@ -4,7 +4,7 @@ use std::fs;
 use std::path::PathBuf;
 
 use serde_json::Value;
-use sim::{Controller, Setting};
+use sim::{Controller, Pattern, Setting};
 
 use crate::ground;
 use crate::support::{Scratch, world_with};
@@ -96,6 +96,38 @@ fn a_log_with_gaps_is_traced() {
     let found = trace(&scratch, "braitenberg", "set", &[]);
     says(&found, "explained", &["wheel-asymmetry"]);
     holds(&found["effects"][0], "ratio", LIMPING, 1.0);
+}
+
+#[test]
+fn a_run_whose_log_has_no_readings_has_the_mean_size_of_the_others() {
+    const GAINS: [f64; 3] = [0.9, 1.05, 1.2];
+    let by_run = Setting {
+        spec: sim::find("reading-gain").unwrap(),
+        pattern: Pattern::ByRun(GAINS.map(|gain| vec![gain]).to_vec()),
+    };
+    let scratch = Scratch::new();
+    Robot::with(by_run).logged(&[4; 3]).record(&scratch, "set");
+    rewrite(&scratch, "set/run_b.csv", |_, mut fields| {
+        fields[3..11].iter_mut().for_each(String::clear);
+        Some(fields)
+    });
+    let found = trace(&scratch, "braitenberg", "set", &[]);
+    says(&found, "explained", &["reading-gain"]);
+    let effect = &found["effects"][0];
+    assert_eq!(effect["by"], "run");
+    let of = |key: &str, run: usize| effect["parameters"][0][key][run].as_f64().unwrap();
+    for (run, gain) in GAINS.into_iter().enumerate() {
+        let (value, low, high) = (of("value", run), of("low", run), of("high", run));
+        assert!((value - gain).abs() < 0.01, "run {run}: {value}");
+        assert!(low < value && value < high, "run {run}: {low} {value} {high}");
+    }
+    // How far the others are apart is how little is known of it.
+    assert!(of("low", 1) < GAINS[0] && of("high", 1) > GAINS[2], "{effect}");
+    let remark = found["remarks"][0].as_str().unwrap();
+    assert!(
+        remark.starts_with("The log of run set/b has no readings"),
+        "{remark}"
+    );
 }
 
 /// A log whose columns from `first` on are multiplied: no controller gives those commands, and nothing is named.
@@ -193,6 +225,21 @@ fn sets_with_different_declarations_are_traced_together() {
     holds(&found["effects"][0], "ratio", LIMPING, 1.0);
     let held_out = serde_json::json!(["set/a", "set/b", "reactive/a", "reactive/b"]);
     assert_eq!(found["error"]["held_out"], held_out);
+
+    // What is held out of the second set is held against simulations of the second declaration.
+    reactive.record(&scratch, "unseen");
+    let held_out = ["--measured", "reactive", "--held-out", "unseen"];
+    let found = trace(&scratch, "braitenberg", "set", &held_out);
+    assert_eq!(
+        found["error"]["held_out"],
+        serde_json::json!(["unseen/a", "unseen/b"])
+    );
+    let gates = scratch.read("out/gates.csv");
+    let rows: Vec<&str> = gates.lines().skip(1).collect();
+    assert!(
+        rows.len() == 100 && rows.iter().all(|row| row.starts_with("reactive,")),
+        "{gates}"
+    );
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! How far the simulated laps are from measured ones, before and after.
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 use rayon::prelude::*;
 use sim::{Setting, Streams};
 
@@ -59,6 +59,11 @@ impl MeanLaps {
         let runs_m: Vec<Vec<Vec<f64>>> = (drives.iter().map(closed))
             .filter(|laps| !laps.is_empty())
             .collect();
+        ensure!(
+            runs_m.len() > 1,
+            "the simulated robot completes laps in {} of {RUNS} runs: no error can be told; look at `lapwing drive` with the same effects",
+            runs_m.len()
+        );
         let mean_m = mean(runs_m.iter().flatten()).context("the simulated robot completes no lap")?;
         let times: Vec<f64> = (drives.iter().flat_map(|d| &d.laps))
             .map(track::Lap::duration_s)

@@ -15,7 +15,7 @@ use std::ops::Range;
 use std::path::Path;
 
 use anyhow::{Result, ensure};
-use diagnose::{Answer, Atlas, Baselines, Detectable, FourNumbers, ObservedLap, Simulate};
+use diagnose::{Answer, Atlas, Baselines, Detectable, FourNumbers, LogRow, ObservedLap, Simulate};
 use sim::Setting;
 
 use answer::{FromLogs, from_logs, log_rows};
@@ -220,11 +220,38 @@ fn remarks(recordings: &[Recording]) -> Vec<String> {
             run.wanted
         ));
     }
+    let logged = with_logs(recordings);
+    if let Some((place, logs)) = &logged {
+        for (run, rows) in recordings[*place].measured.runs.iter().zip(logs) {
+            if !rows.iter().any(LogRow::tells) {
+                remarks.push(format!(
+                    "The log of run {} has no readings beside commands: a size that goes by run is the mean of the other \
+                     runs' there.",
+                    run.name
+                ));
+            }
+        }
+    }
+    let used = logged.map(|(place, _)| place);
+    for (place, recording) in recordings.iter().enumerate() {
+        let set = &recording.measured.set;
+        let count = set.runs.iter().filter(|run| run.rows.log.is_some()).count();
+        if used != Some(place) && count > 0 {
+            let why = match used {
+                Some(_) => "those of another data set are used: trace this one alone to use them",
+                None => "a log in every run is needed: leave out the runs without one to use them",
+            };
+            remarks.push(format!(
+                "The logs of {} ({count} runs) are not used; {why}.",
+                set.name
+            ));
+        }
+    }
     remarks
 }
 
 /// The first recording of which all runs have a log, and its logs.
-fn with_logs(recordings: &[Recording]) -> Option<(usize, Vec<Vec<diagnose::LogRow>>)> {
+fn with_logs(recordings: &[Recording]) -> Option<(usize, Vec<Vec<LogRow>>)> {
     (recordings.iter().enumerate())
         .find_map(|(place, recording)| log_rows(&recording.measured.set).map(|rows| (place, rows)))
 }

@@ -27,6 +27,11 @@ impl From<Step> for LogRow {
 }
 
 impl LogRow {
+    /// Whether it has readings and the command that followed them.
+    pub fn tells(&self) -> bool {
+        self.commands() && self.read().is_some()
+    }
+
     /// Whether the command is known.
     pub(crate) fn commands(&self) -> bool {
         self.command.left_m_s.is_finite() && self.command.right_m_s.is_finite()
