@@ -23,7 +23,7 @@ pub struct Candidate {
 impl Candidate {
     /// The stage of the loop in which it acts.
     pub fn stage(&self) -> Stage {
-        Cause::of(&self.setting).map_or(self.setting.spec.stage, |cause| cause.stage)
+        stage_of(&self.setting)
     }
 
     /// The effect with what tells it from others of its name (a sensor, a place), and its pattern.
@@ -86,11 +86,38 @@ pub(crate) fn apart(value: f64, other: f64, param: &Param) -> f64 {
     }
 }
 
+/// The stage in which a setting shows: that of its effect, or of what an effect without a name acts on.
+pub(crate) fn stage_of(setting: &Setting) -> Stage {
+    Cause::of(setting).map_or(setting.spec.stage, |cause| cause.stage)
+}
+
+/// Gives one run of several the mean of the other runs' values.
+pub(crate) fn take_mean_of_others(values: &mut [Vec<f64>], run: usize) {
+    let others = values.len() as f64 - 1.0;
+    if others < 1.0 || run >= values.len() {
+        return;
+    }
+    for i in 0..values[run].len() {
+        let sum: f64 = values.iter().map(|values| values[i]).sum();
+        values[run][i] = (sum - values[run][i]) / others;
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use sim::find;
 
     use super::*;
+
+    #[test]
+    fn a_run_takes_the_mean_of_the_others() {
+        let mut values = vec![vec![1.0, 5.0], vec![9.0, 9.0], vec![3.0, 6.0]];
+        take_mean_of_others(&mut values, 1);
+        assert_eq!(values, [[1.0, 5.0], [2.0, 5.5], [3.0, 6.0]]);
+        let mut alone = vec![vec![1.0]];
+        take_mean_of_others(&mut alone, 0);
+        assert_eq!(alone, [[1.0]]);
+    }
 
     #[test]
     fn places_go_round_a_wall_and_sizes_stop_at_the_end_of_their_range() {

@@ -121,7 +121,7 @@ impl Atlas {
             together: OnceLock::new(),
             descended_together: OnceLock::new(),
         };
-        let ripple = search.ripple(&Hypothesis { parts: Vec::new() });
+        let ripple = search.ripple(&Hypothesis::nothing());
         let alarm = numbers.omnibus_p() < ALARM_P || self.best_score(&residual) > ALARM_SCORE;
         if !alarm && ripple.is_none() {
             return Ok(LapDiagnosis {
@@ -174,7 +174,7 @@ impl Atlas {
 /// Every explanation of laps that ripple as with a wheel out of round, the answer first: that wheel, unless what explains the rest
 /// of the laps makes them ripple too.
 fn explain_ripple(search: &Search<'_>, screened: &[Screened], ripple: &Ripple) -> Vec<Found> {
-    let nothing = Hypothesis { parts: Vec::new() };
+    let nothing = Hypothesis::nothing();
     let wheel = search.out_of_round(&nothing, ripple);
     let singles = search.singles(screened);
     let rival = singles.first().map_or(0.0, |best| best.explanation.score);

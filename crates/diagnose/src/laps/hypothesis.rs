@@ -6,7 +6,7 @@ use super::atlas::Atlas;
 use super::probe::Probe;
 use super::screen::{at, worth};
 use super::tests_of_fit::Quadratic;
-use crate::candidate::{apart, within};
+use crate::candidate::{apart, take_mean_of_others, within};
 
 /// How an effect goes over the runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -331,6 +331,11 @@ fn middle_s(atlas: &Atlas) -> f64 {
 }
 
 impl Hypothesis {
+    /// The declared model.
+    pub(super) fn nothing() -> Self {
+        Self { parts: Vec::new() }
+    }
+
     /// A single effect.
     pub(super) fn of(part: Part) -> Self {
         Self { parts: vec![part] }
@@ -546,12 +551,8 @@ impl Hypothesis {
 
     /// This hypothesis with the sizes of one run replaced by the mean of the other runs', where they go by run.
     pub(super) fn with_mean_size(mut self, run: usize) -> Self {
-        for part in self.parts.iter_mut().filter(|part| part.values.len() > 1) {
-            let others = part.values.len() as f64 - 1.0;
-            for i in 0..part.values[run].len() {
-                let sum: f64 = part.values.iter().map(|values| values[i]).sum();
-                part.values[run][i] = (sum - part.values[run][i]) / others;
-            }
+        for part in self.parts.iter_mut() {
+            take_mean_of_others(&mut part.values, run);
         }
         self
     }

@@ -385,7 +385,7 @@ impl Search<'_> {
         const SETS: u64 = 4;
         let atlas = self.atlas;
         let probes = [0, 1].map(|i| pair.hypothesis.parts[i].probe);
-        let nothing = atlas.at_rest(Hypothesis { parts: Vec::new() });
+        let nothing = atlas.at_rest(Hypothesis::nothing());
         let settings = pair.hypothesis.settings(atlas);
         let left = atlas.left_beside(self.simulate, self.data, &nothing, &settings, 0..SETS)?;
         let [a, b] = [0, 1].map(|i| tangent(&atlas.nodes(probes[i]), pair.sizes[i]));

@@ -446,7 +446,7 @@ fn left_of(columns: &[Column], target: &White, moves: &DVector<f64>) -> White {
     left
 }
 
-/// A parabola is trusted for twice the step it was made with.
+/// A parabola is trusted for two and a half times the step that it was made with.
 fn bounded(moves: &DVector<f64>, step: &DVector<f64>, share: f64, freedoms: &[Freedom]) -> DVector<f64> {
     DVector::from_fn(moves.len(), |i, _| {
         let most = 2.5 * freedoms[i].step;

@@ -173,7 +173,7 @@ impl Search<'_> {
     }
 
     fn scans(&self) -> Vec<Found> {
-        let nothing = self.atlas.at_rest(Hypothesis { parts: Vec::new() });
+        let nothing = self.atlas.at_rest(Hypothesis::nothing());
         let closer = |scan: &Scan| {
             self.tell(format_args!(
                 "closer sizes of {}",
@@ -202,7 +202,7 @@ impl Search<'_> {
     /// What every effect that jumps leaves at sizes all over its range; simulated once.
     fn scanned(&self) -> &[Scan] {
         self.scanned.get_or_init(|| {
-            let nothing = self.atlas.at_rest(Hypothesis { parts: Vec::new() });
+            let nothing = self.atlas.at_rest(Hypothesis::nothing());
             let scan = |probe: usize| {
                 let name = self.atlas.probes[probe].spec.name;
                 self.tell(format_args!("every size of {name}"));

@@ -3,7 +3,7 @@
 
 use std::f64::consts::TAU;
 
-use sim::{EFFECTS, Pattern, Setting, Spec, Stage, UNLISTED, WheelSpeeds};
+use sim::{EFFECTS, Pattern, Setting, Spec, UNLISTED, WheelSpeeds};
 
 /// How the multiples of a variant's columns become values.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -210,23 +210,6 @@ fn places(wall_lengths_m: [f64; 2], spacing_m: f64) -> impl Iterator<Item = (f64
             let count = (length_m / spacing_m).ceil() as usize;
             (0..count).map(move |i| (wall as f64, i as f64 / count as f64))
         })
-}
-
-/// The stage in which a setting shows: that of its effect, or of what an effect without a name acts on.
-pub(crate) fn stage_of(setting: &Setting) -> Stage {
-    if *setting.spec != UNLISTED {
-        return setting.spec.stage;
-    }
-    let acts_on = match &setting.pattern {
-        Pattern::Constant(values) => values[0],
-        Pattern::ByTime { start, .. } => start[0],
-        Pattern::ByRun(runs) => runs[0][0],
-    };
-    match UNLISTED.params[0].choices.get(acts_on as usize) {
-        Some(&("reading" | "left-right difference")) => Stage::Sense,
-        Some(&("camera x" | "camera y" | "camera scale")) => Stage::Observe,
-        _ => Stage::Act,
-    }
 }
 
 #[cfg(test)]

@@ -2,9 +2,9 @@
 
 use sim::{Error, Forecast, Setting, Stage, World};
 
-use super::catalogue::stage_of;
 use super::filter::{Instant, MEASURED, Trace, difference};
 use super::moments::cut;
+use crate::candidate::stage_of;
 
 /// Another model than that of a trace, which differs from it in one stage, and what it does to the innovations.
 struct Other<'w> {

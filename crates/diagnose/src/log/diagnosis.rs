@@ -1,12 +1,10 @@
 //! From logs to an answer.
 
-use std::sync::Arc;
-
 use sim::{Model, Pattern, Scene, Setting, Stage, find};
 
 use super::channels::Channel;
 use super::decide::{Decided, decided};
-use super::evidence::Evidence;
+use super::evidence::{Evidence, widened};
 use super::filter::MEASURED;
 use super::groups::unlisted_variants;
 use super::recut::recut;
@@ -16,6 +14,7 @@ use super::search::Search;
 use super::steps::reading_step;
 use super::unnamed::Unnamed;
 use crate::answer::{ALTERNATIVE, indistinguishable};
+use crate::candidate::take_mean_of_others;
 use crate::corners::{Corners, EXACT};
 use crate::{Answer, Candidate, Cause, Detectable, Error, Explanation, Verdict, Watch};
 
@@ -52,13 +51,9 @@ pub fn diagnose_logs(
 ) -> Result<LogDiagnosis, Error> {
     watch("the controller");
     let decide = decided(model, runs);
-    let mut wide = model.clone();
-    // Rays a little longer than the range tell how far beyond it a wall is.
-    wide.machine.range_m *= 1.2;
-    let unwind = |error: sim::Error| Error::Simulation(error);
-    let scene = Scene::new(Arc::new(scene.circuit().clone()), &wide, None).map_err(unwind)?;
+    let (wide, scene) = widened(model, scene)?;
     let step = reading_step(runs);
-    let declared = Evidence::new(&scene, model, runs, step.unwrap_or(0.0)).map_err(unwind)?;
+    let declared = Evidence::new(&scene, model, runs, step.unwrap_or(0.0))?;
     if declared.stretches.is_empty() {
         return Err(Error::NoLog);
     }
@@ -124,7 +119,7 @@ impl Search<'_> {
                 explanations.push(explanation);
             }
         }
-        let unnamed = self.unlisted.as_ref().and_then(|u| u.refined.as_ref());
+        let unnamed = self.unnamed.as_ref().and_then(|u| u.refined.as_ref());
         if let Some(refined) = unnamed {
             explanations.insert(0, self.explanation(refined, &certain));
         }
@@ -140,7 +135,7 @@ impl Search<'_> {
         }
         let no_controller = matches!(decide, Decided::NoController { .. });
         let matters = self.remainder.matters();
-        let verdict = match &self.unlisted {
+        let verdict = match &self.unnamed {
             _ if no_controller => Verdict::Unexplained,
             Some(Unnamed { refined: None, .. }) => Verdict::Unexplained,
             Some(_) if matters => Verdict::PartlyExplained,
@@ -155,7 +150,7 @@ impl Search<'_> {
                 depends_on: "reading".into(),
             })
         } else {
-            self.unlisted.as_ref().map(|unnamed| unnamed.cause.clone())
+            self.unnamed.as_ref().map(|unnamed| unnamed.cause.clone())
         };
         let indistinguishable = indistinguishable(explanations.iter(), ALTERNATIVE);
         let runs = self.evidence.measured_runs;
@@ -170,10 +165,14 @@ impl Search<'_> {
         LogDiagnosis {
             answer,
             decide,
-            p: if self.step.is_some() { 0.0 } else { self.p },
+            p: if self.rounding_counts.is_some() {
+                0.0
+            } else {
+                self.p
+            },
             channels: self.channels,
             corners,
-            steps: self.steps,
+            steps: self.control_steps,
             detectable: self.detectable,
         }
     }
@@ -184,12 +183,12 @@ impl Search<'_> {
             Decided::Changed(effects) => effects.clone(),
             _ => Vec::new(),
         };
-        certain.extend(self.step.and_then(|counts| {
+        certain.extend(self.rounding_counts.and_then(|counts| {
             let spec = find("reading-step").ok()?;
             Some(Candidate {
                 setting: Setting::constant(spec, [counts]),
                 standard_errors: vec![2e-4 * counts],
-                gain: self.step_gain,
+                gain: self.rounding_gain,
                 fitted: 1,
             })
         }));
@@ -242,27 +241,11 @@ impl Search<'_> {
             settings.extend(refitted);
             for setting in &mut settings {
                 if let Pattern::ByRun(values) = &mut setting.pattern {
-                    *setting = Setting {
-                        spec: setting.spec,
-                        pattern: Pattern::ByRun(with_mean_of_others(values, run)),
-                    };
+                    take_mean_of_others(values, run);
                 }
             }
             settings
         };
         refitted.into_iter().enumerate().map(without).collect()
     }
-}
-
-/// The values of runs with those of one replaced by the mean of the others'.
-fn with_mean_of_others(values: &[Vec<f64>], run: usize) -> Vec<Vec<f64>> {
-    let mut replaced = values.to_vec();
-    let others = values.len() as f64 - 1.0;
-    if others > 0.0 && run < values.len() {
-        for i in 0..values[run].len() {
-            let sum: f64 = values.iter().map(|v| v[i]).sum();
-            replaced[run][i] = (sum - values[run][i]) / others;
-        }
-    }
-    replaced
 }

@@ -1,15 +1,17 @@
 //! The logs, prepared once, and how well a model with given effects explains them.
 
+use std::sync::Arc;
+
 use rayon::prelude::*;
 use sim::{Forecast, Model, Pattern, Scene, Setting, World};
 use track::Side;
 
-use super::catalogue::{Variant, slow_speeds, stage_of, variants};
+use super::catalogue::{Variant, slow_speeds, variants};
 use super::columns::columns;
 use super::filter::{Trace, Used, clear_readings, filter, leads_elsewhere, likelihood, reaches_elsewhere};
 use super::rows::{LogRow, stretches};
 use super::screen::{Normal, normal_of};
-use crate::candidate::within;
+use crate::candidate::{stage_of, within};
 
 /// A stretch of one run's log and what of it counts.
 #[derive(Debug, Clone)]
@@ -29,6 +31,17 @@ pub(crate) struct Evidence<'a> {
     pub(crate) measured_runs: usize,
     /// Step that the readings are rounded to, counts; 0 for none.
     pub(crate) step_counts: f64,
+}
+
+/// How far rays are cast, as a multiple of the range: a little beyond it they tell how far away a wall is that is not seen.
+pub(crate) const SIGHT: f64 = 1.2;
+
+/// A model with rays that long, and its scene.
+pub(crate) fn widened(model: &Model, scene: &Scene) -> Result<(Model, Scene), sim::Error> {
+    let mut wide = model.clone();
+    wide.machine.range_m *= SIGHT;
+    let scene = Scene::new(Arc::new(scene.circuit().clone()), &wide, None)?;
+    Ok((wide, scene))
 }
 
 /// One value that is fitted: which setting, which of its values, and the step of its derivative.

@@ -3,6 +3,7 @@
 
 use sim::{Forecast, Look, Outlook, Pose, PoseMatrix, Vec2, WheelSpeeds, World};
 
+use super::evidence::SIGHT;
 use super::moments::{Likelihood, cut, likelihood_of_cut};
 use super::rows::{LogRow, start_pose};
 
@@ -486,6 +487,6 @@ const EDGE_M: f64 = 0.002;
 
 /// Whether a small turn makes a ray jump from one wall to another, or to none, within the range.
 fn leaps(at: f64, beside: f64, range_m: f64) -> bool {
-    let (at, beside) = (at.min(1.2 * range_m), beside.min(1.2 * range_m));
+    let (at, beside) = (at.min(SIGHT * range_m), beside.min(SIGHT * range_m));
     at.min(beside) < range_m && (at - beside).abs() > 0.012 + 0.15 * at.min(beside)
 }

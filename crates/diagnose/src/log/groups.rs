@@ -2,7 +2,8 @@
 
 use sim::{Setting, Stage, UNLISTED};
 
-use super::catalogue::{Shape, Variant, stage_of};
+use super::catalogue::{Shape, Variant};
+use crate::candidate::stage_of;
 
 /// Values before the coefficients: what a cause acts on and depends on, and its basis.
 pub(crate) const WORDS: usize = 3;

@@ -57,18 +57,26 @@ impl Remainder {
 pub(super) struct Search<'a> {
     pub(super) evidence: Evidence<'a>,
     pub(super) variants: Vec<Variant>,
+    /// Log-likelihood of the declared model, by stretch.
     pub(super) base: Vec<f64>,
+    /// Candidates with their best values, best first.
     pub(super) found: Vec<Refined>,
+    /// Probability that as much is found in the logs of a robot that is as declared.
     pub(super) p: f64,
+    /// Beside the best candidate.
     pub(super) remainder: Remainder,
-    pub(super) unlisted: Option<Unnamed>,
+    /// A cause without a name, if that is the answer.
+    pub(super) unnamed: Option<Unnamed>,
+    /// Under the best candidate.
     pub(super) channels: [Channel; MEASURED],
-    pub(super) step: Option<f64>,
-    pub(super) step_gain: f64,
-    pub(super) steps: usize,
+    /// Step that the readings were rounded to, counts, and what it gains in log-likelihood.
+    pub(super) rounding_counts: Option<f64>,
+    pub(super) rounding_gain: f64,
+    /// Control steps that are used.
+    pub(super) control_steps: usize,
     pub(super) detectable: Vec<Detectable>,
     /// The last screening and its settings.
-    pub(super) screened: Option<(Vec<Setting>, Arc<Screened<'a>>)>,
+    screened: Option<(Vec<Setting>, Arc<Screened<'a>>)>,
 }
 
 /// Two effects, each with the setting where a refinement of both begins.
@@ -78,29 +86,29 @@ type Parts = [(Variant, Setting); 2];
 type Screened<'a> = (Vec<(World<'a>, Trace)>, Vec<Lead>);
 
 impl<'a> Search<'a> {
-    pub(super) fn new(evidence: Evidence<'a>, step: Option<f64>) -> Result<Self, Error> {
+    pub(super) fn new(evidence: Evidence<'a>, rounding_counts: Option<f64>) -> Result<Self, Error> {
         let traces = evidence.traces(&[]).ok_or(Error::NoLog)?;
         let base: Vec<f64> = traces.iter().map(|(_, trace)| trace.log_likelihood).collect();
         let unrounded = Evidence {
             step_counts: 0.0,
             ..evidence.elsewhere(evidence.scene)
         };
-        let step_gain = match step {
+        let rounding_gain = match rounding_counts {
             Some(_) => base.iter().sum::<f64>() - unrounded.likelihood(&[]).unwrap_or(f64::NEG_INFINITY),
             None => 0.0,
         };
         Ok(Self {
             variants: evidence.variants(),
             channels: channels(&traces),
-            steps: traces.iter().map(|(_, trace)| trace.instants.len()).sum(),
+            control_steps: traces.iter().map(|(_, trace)| trace.instants.len()).sum(),
             base,
             evidence,
             found: Vec::new(),
             p: 1.0,
             remainder: Remainder::NONE,
-            unlisted: None,
-            step,
-            step_gain,
+            unnamed: None,
+            rounding_counts,
+            rounding_gain,
             detectable: Vec::new(),
             screened: None,
         })
@@ -148,7 +156,7 @@ impl<'a> Search<'a> {
         /// What is no gain at all, so that logarithms of gains exist.
         const LEAST: f64 = 1.0;
         let p = least_p(leads);
-        if self.step.is_none() || p >= ALARM {
+        if self.rounding_counts.is_none() || p >= ALARM {
             return p;
         }
         let best = self.variants_of(&shortlist(leads, &self.variants, PROMISING));
@@ -236,7 +244,7 @@ impl<'a> Search<'a> {
 
     /// The same search with other evidence, its candidates refined again by it.
     pub(super) fn renewed<'b>(self, evidence: Evidence<'b>) -> Result<Search<'b>, Error> {
-        let mut renewed = Search::new(evidence, self.step)?;
+        let mut renewed = Search::new(evidence, self.rounding_counts)?;
         (renewed.p, renewed.detectable) = (self.p, self.detectable);
         renewed.found = (self.found.iter())
             .filter_map(|found| renewed.renew(found, &renewed.evidence, renewed.total()))
@@ -276,7 +284,7 @@ impl<'a> Search<'a> {
         self.second(leads);
         self.sort();
         self.judge();
-        if let (Some(best), None, None) = (self.found.first_mut(), self.step, &self.unlisted) {
+        if let (Some(best), None, None) = (self.found.first_mut(), self.rounding_counts, &self.unnamed) {
             *best = best.clone().with_honest_errors(&self.evidence, &self.variants);
         }
         if let Some(twin) = self.found.first().and_then(with_memory) {

@@ -1,10 +1,8 @@
 //! How far a robot's log would tell two explanations apart.
 
-use std::sync::Arc;
-
 use sim::{Model, Scene, Setting};
 
-use super::evidence::Evidence;
+use super::evidence::{Evidence, widened};
 use super::groups::unlisted_variants;
 use super::refine::{knobs_of, refine};
 use super::rows::LogRow;
@@ -19,9 +17,7 @@ pub fn log_separation(
     rival: &[Setting],
 ) -> Option<f64> {
     const STEPS: usize = 4;
-    let mut wide = model.clone();
-    wide.machine.range_m *= 1.2;
-    let scene = Scene::new(Arc::new(scene.circuit().clone()), &wide, None).ok()?;
+    let (_, scene) = widened(model, scene).ok()?;
     let mut true_model = model.clone();
     true_model.effects.extend_from_slice(answer);
     let masks = Evidence::new(&scene, &true_model, runs, 0.0).ok()?;

@@ -2,12 +2,12 @@
 
 use sim::Pattern;
 
-use super::catalogue::stage_of;
 use super::evidence::Evidence;
 use super::groups::settling_variants;
 use super::leads::{Lead, constant, start};
 use super::refined::{Refined, together};
 use super::screen::normals;
+use crate::candidate::stage_of;
 
 /// Steps of a refinement at most.
 const STEPS: usize = 12;

@@ -25,7 +25,7 @@ impl Search<'_> {
     pub(super) fn judge(&mut self) {
         let gain = self.found.first().map_or(0.0, |best| best.gain);
         if let Some(wheels) = out_of_round(&self.evidence, self.best(), FAULTS * gain) {
-            self.unlisted = Cause::of(&wheels.settings[0]).map(|cause| {
+            self.unnamed = Cause::of(&wheels.settings[0]).map(|cause| {
                 let refined = Some(wheels).filter(|wheels| wheels.score() > gain);
                 Unnamed { cause, refined }
             });
@@ -33,17 +33,17 @@ impl Search<'_> {
         }
         let settles = (self.found.first()).and_then(|best| settling(&self.evidence, best, self.total()));
         if let Some(settles) = settles {
-            self.unlisted = Cause::of(&settles.settings[0]).map(|cause| Unnamed {
+            self.unnamed = Cause::of(&settles.settings[0]).map(|cause| Unnamed {
                 cause,
                 refined: Some(settles),
             });
             return;
         }
         if self.remainder.matters() || self.found.is_empty() {
-            self.unlisted = self.characterise(gain);
+            self.unnamed = self.characterise(gain);
         }
-        if self.unlisted.is_none() {
-            self.unlisted = rough(&self.channels, FAULTS * gain).filter(|_| !self.is_rough_by_itself());
+        if self.unnamed.is_none() {
+            self.unnamed = rough(&self.channels, FAULTS * gain).filter(|_| !self.is_rough_by_itself());
         }
     }
 
