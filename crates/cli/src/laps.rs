@@ -29,6 +29,8 @@ pub(crate) struct SampledRun {
     pub(crate) timed_out: bool,
     /// Time of the run's first row, s.
     pub(crate) began_s: f64,
+    /// Sightings that are not used, in words.
+    pub(crate) strays: Vec<String>,
 }
 
 impl SampledRun {
@@ -54,6 +56,7 @@ impl SampledRun {
             wanted,
             timed_out: false,
             began_s,
+            strays: Vec::new(),
         }
     }
 
@@ -93,11 +96,11 @@ impl SampledRun {
 
     /// What a user must know of laps that are not there, if anything.
     pub(crate) fn remarks(&self) -> Vec<String> {
-        let mut remarks: Vec<String> = self
-            .set_aside
-            .iter()
-            .map(|(lap, gate)| format!("{}: lap {lap} misses gate {gate} and is set aside", self.name))
-            .collect();
+        let mut remarks = self.strays.clone();
+        remarks.extend(
+            (self.set_aside.iter())
+                .map(|(lap, gate)| format!("{}: lap {lap} misses gate {gate} and is set aside", self.name)),
+        );
         if self.laps.len() < self.wanted {
             let ending = if self.timed_out {
                 " (the run timed out)"
@@ -124,18 +127,22 @@ pub(crate) struct Measured {
 }
 
 impl Measured {
-    /// The laps of a data set on a circuit that is at hand.
+    /// The laps of a data set on a circuit that is at hand. Sightings where no robot can be are taken for none.
     ///
     /// # Errors
     /// A run without a whole lap after its first.
-    pub(crate) fn on(set: DataSet, circuit: Arc<Circuit>) -> Result<Self> {
+    pub(crate) fn on(mut set: DataSet, circuit: Arc<Circuit>) -> Result<Self> {
         let config = set.declared_config(&Config::shipped())?;
         let way = setup::way(&config, &circuit.course);
-        let runs = set
-            .runs
-            .par_iter()
-            .map(|run| sample(&set, run, &circuit, way))
-            .collect::<Result<_>>()?;
+        let strays: Vec<Vec<String>> = set.runs.iter_mut().map(without_strays).collect();
+        let sampled: Vec<Result<SampledRun>> = (set.runs.par_iter().zip(strays))
+            .map(|(run, strays)| {
+                let sampled = sample(&set, run, &circuit, way)?;
+                Ok(SampledRun { strays, ..sampled })
+            })
+            .collect();
+        // Of several runs at fault the first is named, whichever thread came first.
+        let runs = sampled.into_iter().collect::<Result<_>>()?;
         Ok(Self { set, circuit, runs })
     }
 
@@ -169,6 +176,69 @@ fn seen(run: &RunFile) -> impl Iterator<Item = (f64, Vec2)> {
     rows.filter_map(|(&time_s, position)| position.map(|[x, y]| (time_s, Vec2::new(x, y))))
 }
 
+/// Takes sightings away where no robot can have been between those beside them, and says which.
+fn without_strays(run: &mut RunFile) -> Vec<String> {
+    let path = run.path.display().to_string();
+    let rows = &mut run.rows;
+    let say = |row: usize| {
+        let [x, y] = rows.position_m[row].unwrap_or([f64::NAN; 2]);
+        let time_s = rows.t_s[row];
+        format!(
+            "{path}: at t_s = {time_s:.3} the robot is seen at ({x}, {y}), where it cannot get from where it is seen \
+             before and after; taken as not seen"
+        )
+    };
+    let strays = strays(&rows.t_s, &rows.position_m);
+    let words = strays.iter().map(|&row| say(row)).collect();
+    for row in strays {
+        rows.position_m[row] = None;
+    }
+    words
+}
+
+/// The rows in which a robot is seen where it cannot get, and out of which it comes back; none if they are many, which is no
+/// fault of single sightings.
+fn strays(t_s: &[f64], position_m: &[Option<[f64; 2]>]) -> Vec<usize> {
+    /// A robot's speed at most, and how far sightings of it may be off.
+    const FAST_M_S: f64 = 0.2;
+    const OFF_M: f64 = 0.05;
+    /// Time within which it has come back, s, if not with the very next sighting.
+    const SOON_S: f64 = 0.6;
+    /// Share of the sightings that are many.
+    const MANY: f64 = 0.01;
+    let seen: Vec<(usize, f64, [f64; 2])> = (t_s.iter().zip(position_m).enumerate())
+        .filter_map(|(row, (&time_s, position))| position.map(|position_m| (row, time_s, position_m)))
+        .collect();
+    let gets = |a: usize, b: usize| {
+        let ((_, from_s, from), (_, to_s, to)) = (seen[a], seen[b]);
+        let way_m = (to[0] - from[0]).hypot(to[1] - from[1]);
+        way_m <= OFF_M + FAST_M_S * (to_s - from_s).abs()
+    };
+    let mut strays = Vec::new();
+    let mut last = 0;
+    if seen.len() > 2 && !gets(0, 1) && gets(1, 2) {
+        strays.push(seen[0].0);
+        last = 1;
+    }
+    let mut next = last + 1;
+    while next < seen.len() {
+        if !gets(last, next) {
+            let soon = |&later: &usize| later == next + 1 || seen[later].1 - seen[last].1 <= SOON_S;
+            let mut later = (next + 1..seen.len()).take_while(soon);
+            if let Some(back) = later.find(|&later| gets(last, later)) {
+                strays.extend(seen[next..back].iter().map(|(row, ..)| row));
+                next = back;
+            }
+        }
+        last = next;
+        next += 1;
+    }
+    if strays.len() as f64 > MANY * seen.len() as f64 {
+        return Vec::new();
+    }
+    strays
+}
+
 fn sample(set: &DataSet, run: &RunFile, circuit: &Circuit, way: Way) -> Result<SampledRun> {
     let mut tracker = LapTracker::new(&circuit.gates, way);
     let whole: Vec<Lap> = seen(run)
@@ -184,9 +254,10 @@ fn sample(set: &DataSet, run: &RunFile, circuit: &Circuit, way: Way) -> Result<S
             );
         }
         bail!(
-            "{path}: {} whole laps, and the first is not analysed: at least two are needed; check the world, the \
+            "{path}: {} whole lap{}, and the first is not analysed: at least two are needed; check the world, the \
              driving direction ([declared] run.direction in dataset.toml) and the unit of x_m and y_m",
-            whole.len()
+            whole.len(),
+            if whole.len() == 1 { "" } else { "s" }
         );
     }
     Ok(sampled)
@@ -235,6 +306,26 @@ mod tests {
         };
         let whole: Vec<Lap> = (0..4).map(lap).collect();
         SampledRun::new("set", "a", &whole, 3, began_s)
+    }
+
+    #[test]
+    fn sightings_where_no_robot_gets_are_strays_if_it_comes_back() {
+        let t_s: Vec<f64> = (0..1000).map(|i| 0.064 * f64::from(i)).collect();
+        let way: Vec<Option<[f64; 2]>> = (0..1000).map(|i| Some([0.003 * f64::from(i), 0.5])).collect();
+        assert_eq!(strays(&t_s, &way), [0; 0]);
+        let mut seen = way.clone();
+        for row in [0, 400, 401, 700] {
+            seen[row] = Some([57.0, 0.5]);
+        }
+        seen[402] = None;
+        assert_eq!(strays(&t_s, &seen), [0, 400, 401, 700]);
+        // Carried elsewhere it does not come back.
+        let mut carried = way.clone();
+        carried[500..].iter_mut().flatten().for_each(|at| at[1] = 0.9);
+        assert_eq!(strays(&t_s, &carried), [0; 0]);
+        // Another unit is no fault of single sightings.
+        let millimetres: Vec<_> = way.iter().map(|at| at.map(|at| at.map(|m| 1000.0 * m))).collect();
+        assert_eq!(strays(&t_s, &millimetres), [0; 0]);
     }
 
     #[test]

@@ -1,10 +1,12 @@
 //! `lapwing trace`: what the model lacks.
 
-use anyhow::Result;
+use std::collections::BTreeMap;
+
+use anyhow::{Result, ensure};
 use serde_json::json;
 
 use crate::args;
-use crate::dataset::DataSet;
+use crate::dataset::{DESCRIPTION, DataSet};
 use crate::experiments::Section;
 use crate::output::{OutDir, Work};
 use crate::report::Report;
@@ -18,6 +20,7 @@ pub(crate) fn run(session: &Session, args: &args::Trace) -> Result<()> {
         .map(|path| DataSet::load(path))
         .collect::<Result<_>>()?;
     let held_out = args.held_out.as_deref().map(DataSet::load).transpose()?;
+    each_once(sets.iter().chain(&held_out))?;
     let mut inputs = vec![file.input.clone()];
     inputs.extend(sets.iter().flat_map(|set| set.inputs.clone()));
     inputs.extend(held_out.iter().flat_map(|set| set.inputs.clone()));
@@ -66,4 +69,20 @@ pub(crate) fn run(session: &Session, args: &args::Trace) -> Result<()> {
         "{text}\n\n{tables}report: {}\n",
         args.out.join("report.html").display()
     ))
+}
+
+/// Whether every run is given once: twice it would count for two, and held out it would be no test.
+fn each_once<'a>(sets: impl Iterator<Item = &'a DataSet>) -> Result<()> {
+    let mut known: BTreeMap<&str, &str> = BTreeMap::new();
+    let files = sets.flat_map(|set| &set.inputs);
+    for file in files.filter(|file| !file.path.ends_with(DESCRIPTION)) {
+        let other = known.insert(&file.sha256, &file.path);
+        ensure!(
+            other.is_none(),
+            "{}: the same run as {}; give each run once: what is held out must not be fitted, and what is given twice counts twice",
+            file.path,
+            other.unwrap_or_default()
+        );
+    }
+    Ok(())
 }

@@ -1,7 +1,7 @@
 //! Signatures of a model, kept between calls.
 
 use std::fs;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use diagnose::Atlas;
 
@@ -40,15 +40,21 @@ impl Cache {
             .flatten()
     }
 
-    /// Keeps an atlas; a cache that cannot be written is no error, the next call only takes longer.
-    pub(crate) fn put(&self, key: &str, atlas: &Atlas) -> Option<()> {
-        let file = self.file(key)?;
-        fs::create_dir_all(file.parent()?).ok()?;
+    /// Keeps an atlas, if there is a folder for it.
+    ///
+    /// # Errors
+    /// A folder that cannot be written, which only makes the next call take longer.
+    pub(crate) fn put(&self, key: &str, atlas: &Atlas) -> Result<(), &Path> {
+        let (Some(folder), Some(file)) = (self.0.as_deref(), self.file(key)) else {
+            return Ok(());
+        };
         let bytes = atlas.to_bytes();
         let whole = [sha256(&bytes).as_bytes(), &bytes].concat();
         let partial = file.with_extension(format!("partial{}", std::process::id()));
-        fs::write(&partial, whole).ok()?;
-        fs::rename(&partial, &file).ok()
+        fs::create_dir_all(folder)
+            .and_then(|()| fs::write(&partial, whole))
+            .and_then(|()| fs::rename(&partial, &file))
+            .map_err(|_| folder)
     }
 }
 

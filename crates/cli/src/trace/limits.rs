@@ -10,6 +10,25 @@ use super::next::Experiment;
 use crate::experiments::Block;
 use crate::table::{Table, far_from, probability};
 
+/// What the logged commands say of the controller.
+pub(super) fn decide_in_words(decide: &Decided) -> String {
+    match decide {
+        Decided::AsDeclared => {
+            "The declared controller gives every logged command from the logged readings.".to_owned()
+        }
+        Decided::Changed(effects) => format!(
+            "The logged commands follow from the logged readings with another constant: {}.",
+            effects.iter().map(|e| e.label()).collect::<Vec<_>>().join(", ")
+        ),
+        Decided::NoController { share } => format!(
+            "No controller of this kind gives {:.1} % of the logged commands from the logged readings: look at the units (readings in \
+             counts, speeds in m/s) and at the controller.",
+            100.0 * share
+        ),
+        Decided::Unknown => "No control step has both readings and commands.".to_owned(),
+    }
+}
+
 /// The next experiment in a sentence; `None` where nothing has to be told apart.
 pub(crate) fn next_in_words(trace: &Trace) -> Option<String> {
     let best = trace.experiments.first()?;
@@ -132,21 +151,7 @@ pub(super) fn stages(trace: &Trace) -> Vec<Block> {
         )];
     };
     let logs = &found.logs;
-    let decide = match &logs.decide {
-        Decided::AsDeclared => {
-            "The declared controller gives every logged command from the logged readings.".to_owned()
-        }
-        Decided::Changed(effects) => format!(
-            "The logged commands follow from the logged readings with another constant: {}.",
-            effects.iter().map(|e| e.label()).collect::<Vec<_>>().join(", ")
-        ),
-        Decided::NoController { share } => format!(
-            "No controller of this kind gives {:.1} % of the logged commands from the logged readings: look at the units (readings in \
-             counts, speeds in m/s) and at the controller.",
-            100.0 * share
-        ),
-        Decided::Unknown => "No control step has both readings and commands.".to_owned(),
-    };
+    let decide = decide_in_words(&logs.decide);
     let agree = if found.confirmed {
         "The laps agree."
     } else {

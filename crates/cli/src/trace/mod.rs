@@ -15,13 +15,14 @@ use std::ops::Range;
 use std::path::Path;
 
 use anyhow::{Result, ensure};
-use diagnose::{Answer, Atlas, Baselines, Detectable, FourNumbers, LogRow, ObservedLap, Simulate};
+use diagnose::{Answer, Atlas, Baselines, Decided, Detectable, FourNumbers, LogRow, ObservedLap, Simulate};
 use sim::Setting;
 
 use answer::{FromLogs, from_logs, log_rows};
 pub(crate) use cache::Cache;
 pub(crate) use document::{document, parameters};
 pub(crate) use error::{MeanLaps, mean};
+use limits::decide_in_words;
 use next::{Experiment, experiments};
 pub(crate) use pages::{digest, gates_csv, sections, summary};
 use recording::{Recording, Seeds, held_out, simulate_all};
@@ -101,7 +102,8 @@ impl Trace {
         let few = laps.iter().position(|run| run.len() < 3);
         ensure!(
             few.is_none(),
-            "run {} has {} whole laps after its first: at least 3 in every run are needed to trace anything",
+            "run {} has {} whole laps after its first: at least 3 in every run are needed to trace anything; leave the run \
+             out of `runs` in dataset.toml, or measure it again",
             runs(&recordings)
                 .nth(few.unwrap_or(0))
                 .map_or("", |run| run.name.as_str()),
@@ -150,8 +152,14 @@ impl Trace {
         progress.message("simulating the error before and after");
         let errors = errors(&recordings, &answer, unseen, seed)?;
         interrupt::check()?;
+        let mut remarks = remarks(&recordings);
+        if let Some(found) = &from_logs
+            && matches!(found.logs.decide, Decided::NoController { .. })
+        {
+            remarks.push(decide_in_words(&found.logs.decide));
+        }
         let mut trace = Self {
-            remarks: remarks(&recordings),
+            remarks,
             laps_simulated: laps_simulated(&recordings, &atlas, purpose),
             detectable: match &from_logs {
                 Some(found) => found.logs.detectable.clone(),
@@ -212,6 +220,7 @@ fn remarks(recordings: &[Recording]) -> Vec<String> {
                 .to_owned(),
         );
     }
+    remarks.extend(runs(recordings).flat_map(|run| run.strays.clone()));
     for run in runs(recordings).filter(|run| run.laps.len() < run.wanted) {
         remarks.push(format!(
             "Run {} has {} of {} laps.",
@@ -394,6 +403,11 @@ fn atlas(session: &Session, recording: &Recording, purpose: Purpose, cache: &Cac
     drop(progress);
     interrupt::check()?;
     let atlas = atlas?;
-    cache.put(&key, &atlas);
+    if let Some(folder) = cache.put(&key, &atlas).err() {
+        session.remark(&format!(
+            "{}: signatures cannot be kept here and are simulated anew next time; choose another folder with --cache",
+            folder.display()
+        ));
+    }
     Ok(atlas)
 }

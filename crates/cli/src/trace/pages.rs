@@ -1,12 +1,12 @@
 //! A trace as a colleague would write it: sections of a report.
 
 use anyhow::Result;
-use diagnose::{Candidate, Cause, Explanation, FourNumbers, Quadratic, Verdict};
+use diagnose::{Candidate, Cause, Decided, Explanation, FourNumbers, Quadratic, Verdict};
 use sim::Pattern;
 
 use super::answer::rivals;
 use super::document::distinct;
-use super::limits::{limits, next_experiment, next_in_words, stages};
+use super::limits::{decide_in_words, limits, next_experiment, next_in_words, stages};
 use super::unnamed::unnamed;
 use super::{MeanLaps, Trace, mean, pictures};
 use crate::experiments::{Block, Picture, Section};
@@ -118,13 +118,17 @@ fn unexplained(trace: &Trace) -> String {
             }
         );
     }
+    if let Some(found) = &trace.from_logs
+        && matches!(found.logs.decide, Decided::NoController { .. })
+    {
+        return format!("Unexplained: {}", decide_in_words(&found.logs.decide));
+    }
     let known = trace.answer.cause.as_ref().map(|cause| {
-        format!(
-            " It sits in the {} stage: {} by {}.",
-            cause.stage.name(),
-            cause.acts_on,
-            cause.depends_on
-        )
+        let stage = cause.stage.name();
+        match cause.depends_on.as_str() {
+            "chance" => format!(" It sits in the {stage} stage: noise of the {}.", cause.acts_on),
+            on => format!(" It sits in the {stage} stage: {} by {on}.", cause.acts_on),
+        }
     });
     format!(
         "Unexplained: the data depart from the declared model, and no effect in the registry explains it. No name would be honest.{}",

@@ -37,6 +37,25 @@ pub(crate) struct RunPlace {
     pub(crate) start: Option<Start>,
 }
 
+/// Whether laps take about as long as the declared robot's: if not, by no effect that is worth a search, times are in another unit.
+fn in_seconds(measured: &Measured, setup: &Setup) -> Result<()> {
+    /// A robot that turns on the spot needs longer than the midline's length at its speed says.
+    const TIMES: f64 = 5.0;
+    let midline_m = setup.scene.circuit().gates.midline_length_m();
+    let declared_s = midline_m / setup.model.machine.controller.speed_m_s();
+    for (run, file) in measured.runs.iter().zip(&measured.set.runs) {
+        let times_s = run.lap_times_s();
+        let lap_s = times_s.iter().sum::<f64>() / times_s.len() as f64;
+        ensure!(
+            (declared_s / TIMES..=declared_s * TIMES).contains(&lap_s),
+            "{}: a lap takes {lap_s:.3} s, and the declared robot needs about {declared_s:.0} s at its speed: is t_s in seconds, \
+             and controller.speed_m_s ([declared] in dataset.toml) that of this robot?",
+            file.path.display()
+        );
+    }
+    Ok(())
+}
+
 impl Recording {
     /// A data set, checked against the model.
     ///
@@ -60,6 +79,7 @@ impl Recording {
             .flat_map(SampledRun::remarks)
             .for_each(|remark| session.remark(&remark));
         let setup = Setup::new(&config, circuit, None)?;
+        in_seconds(&measured, &setup)?;
         let cuts = diagnose::other_cuts(&setup.scene, &setup.model)
             .into_iter()
             .map(|scene| Setup {

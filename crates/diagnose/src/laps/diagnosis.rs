@@ -328,7 +328,8 @@ fn verdict_of(best: &Explanation) -> Verdict {
         1 => ENOUGH,
         _ => MOST,
     };
-    if best.share >= enough {
+    let leaves_too_much = best.remainder.is_some_and(|left| left.are_far_beyond_chance());
+    if best.share >= enough && !leaves_too_much {
         Verdict::PartlyExplained
     } else {
         Verdict::Unexplained

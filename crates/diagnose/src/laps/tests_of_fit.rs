@@ -38,7 +38,9 @@ impl Quadratic {
         let (n, p) = (NULL_SETS as f64 - 1.0, freedom as f64);
         let t2 = q * n / (n - p - 1.0);
         let f = t2 * (n - p + 1.0) / (n * p);
-        let tail = FisherSnedecor::new(p, n - p + 1.0).map_or(1.0, |law| law.sf(f));
+        // Beyond this the tail is 0, and its continued fraction has no value.
+        const ENORMOUS: f64 = 1e12;
+        let tail = FisherSnedecor::new(p, n - p + 1.0).map_or(1.0, |law| law.sf(f.min(ENORMOUS)));
         Self { q, freedom, p: tail }
     }
 
@@ -98,17 +100,44 @@ impl FourNumbers {
         self.all().iter().map(Quadratic::excess).sum()
     }
 
+    /// All four together.
+    fn together(&self) -> Quadratic {
+        let q = self.all().iter().map(|number| number.q).sum();
+        let freedom = self.all().iter().map(|number| number.freedom).sum();
+        Quadratic::new(q, freedom)
+    }
+
     /// Whether chance alone often makes as much of all four together.
     pub(crate) fn excess_is_chance(&self) -> bool {
         const OFTEN_P: f64 = 0.05;
-        let q = self.all().iter().map(|number| number.q).sum();
-        let freedom = self.all().iter().map(|number| number.freedom).sum();
-        Quadratic::new(q, freedom).p > OFTEN_P
+        self.together().p > OFTEN_P
+    }
+
+    /// Whether all four together are so much more than chance that no share of anything larger makes up for it.
+    pub(crate) fn are_far_beyond_chance(&self) -> bool {
+        const FAR: f64 = 20.0;
+        let Quadratic { q, freedom, .. } = self.together();
+        q > FAR * freedom as f64
     }
 
     /// Probability that the smallest of the four is as small as it is: four times that (Bonferroni).
     pub fn omnibus_p(&self) -> f64 {
         let least = self.all().iter().map(|number| number.p).fold(1.0, f64::min);
         (4.0 * least).min(1.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn enormous_sums_are_no_chance() {
+        for q in [1e3, 1e9, 1e20, 1e300, f64::INFINITY] {
+            let found = Quadratic::of_estimated(q, SECOND);
+            assert!(found.p < 1e-9, "{found:?}");
+        }
+        let usual = Quadratic::of_estimated(SECOND as f64, SECOND).p;
+        assert!((0.3..0.7).contains(&usual), "{usual}");
     }
 }

@@ -145,9 +145,9 @@ fn beyond_limit(model: &Model, runs: &[&[LogRow]]) -> f64 {
     beyond / all.max(1.0)
 }
 
-/// The power of ten, at most 0.1, that all readings of a log are multiples of.
+/// The power of ten, at most 1, that all readings of a log are multiples of.
 fn written_counts(rows: &[LogRow]) -> f64 {
-    const DECIMALS: std::ops::RangeInclusive<i32> = 1..=6;
+    const DECIMALS: std::ops::RangeInclusive<i32> = 0..=6;
     let all_are_multiples = |decimals: &i32| {
         let scale = 10.0_f64.powi(*decimals);
         let is_multiple = |reading: &f64| (scale * reading - (scale * reading).round()).abs() < 1e-4;

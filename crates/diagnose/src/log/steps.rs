@@ -2,11 +2,13 @@
 
 use super::rows::LogRow;
 
+/// Step up to which whole counts tell nothing but how they were written.
+const WHOLE: f64 = 1.5;
 /// Readings looked at.
 const LOOKED_AT: usize = 4000;
 
 /// The step of which all readings are multiples, counts; `None` if they are not multiples of anything coarser than
-/// what the file can tell.
+/// what the file can tell, which may have whole counts.
 pub(crate) fn reading_step(runs: &[&[LogRow]]) -> Option<f64> {
     let readings: Vec<f64> = (runs.iter().flat_map(|rows| rows.iter()).filter_map(LogRow::read))
         .flatten()
@@ -24,7 +26,9 @@ pub(crate) fn reading_step(runs: &[&[LogRow]]) -> Option<f64> {
     let guess = (1..=12)
         .map(|k| smallest / f64::from(k))
         .find(|&step| step > 0.45 && fits(&some, step))?;
-    Some(sharpened(&readings, guess))
+    let whole = some.iter().all(|reading| reading.fract() == 0.0);
+    let step = sharpened(&readings, guess);
+    (!whole || step > WHOLE).then_some(step)
 }
 
 /// Whether all readings lie within the file's rounding of multiples of something near the guess, which is known no better where
@@ -87,6 +91,10 @@ mod tests {
             assert!((found / step - 1.0).abs() < 1e-3, "{found} for {step}");
         }
         assert_eq!(reading_step(&[&rows(0.0)]), None);
+        // Written without decimals.
+        assert_eq!(reading_step(&[&rows(1.0)]), None);
+        let found = reading_step(&[&rows(2.0)]).unwrap();
+        assert!((found - 2.0).abs() < 1e-6, "{found}");
     }
 
     #[test]
