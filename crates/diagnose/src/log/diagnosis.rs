@@ -11,7 +11,7 @@ use super::recut::recut;
 use super::refined::Refined;
 use super::rows::LogRow;
 use super::search::Search;
-use super::steps::reading_step;
+use super::steps::{reading_step, written_step};
 use super::unnamed::Unnamed;
 use crate::answer::{ALTERNATIVE, indistinguishable};
 use crate::candidate::take_mean_of_others;
@@ -53,7 +53,7 @@ pub fn diagnose_logs(
     let decide = decided(model, runs);
     let (wide, scene) = widened(model, scene)?;
     let step = reading_step(runs);
-    let declared = Evidence::new(&scene, model, runs, step.unwrap_or(0.0))?;
+    let declared = Evidence::new(&scene, model, runs, step.unwrap_or_else(|| written_step(runs)))?;
     if declared.stretches.is_empty() {
         return Err(Error::NoLog);
     }

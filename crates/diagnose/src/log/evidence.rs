@@ -11,6 +11,7 @@ use super::columns::columns;
 use super::filter::{Trace, Used, clear_readings, filter, leads_elsewhere, likelihood, reaches_elsewhere};
 use super::rows::{LogRow, stretches};
 use super::screen::{Normal, normal_of};
+use super::steps::WHOLE;
 use crate::candidate::{stage_of, within};
 
 /// A stretch of one run's log and what of it counts.
@@ -29,7 +30,7 @@ pub(crate) struct Evidence<'a> {
     pub(crate) stretches: Vec<Stretch<'a>>,
     /// Runs that were measured, with evidence or without.
     pub(crate) measured_runs: usize,
-    /// Step that the readings are rounded to, counts; 0 for none.
+    /// Step that the readings are rounded to, by the robot or by the file, counts.
     pub(crate) step_counts: f64,
 }
 
@@ -137,6 +138,11 @@ impl<'a> Evidence<'a> {
             measured_runs: runs.len(),
             step_counts,
         })
+    }
+
+    /// Whether the robot rounds its readings, and not the file.
+    pub(crate) fn is_coarse(&self) -> bool {
+        self.step_counts > WHOLE
     }
 
     /// What is tried on these logs.

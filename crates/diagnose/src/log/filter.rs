@@ -4,7 +4,7 @@
 use sim::{Forecast, Look, Outlook, Pose, PoseMatrix, Vec2, WheelSpeeds, World};
 
 use super::evidence::SIGHT;
-use super::moments::{Likelihood, cut, likelihood_of_cut};
+use super::moments::{FINE, Likelihood, cut, likelihood_of_cut};
 use super::rows::{LogRow, start_pose};
 
 /// Numbers measured in a control step: camera x and y, then the eight readings.
@@ -64,7 +64,7 @@ pub(crate) struct Trace {
     pub(crate) instants: Vec<Instant>,
     /// Sum over the used numbers of -(innovation^2 + log variance) / 2, or of what is likely of readings that may be cut.
     pub(crate) log_likelihood: f64,
-    /// Step that the readings are rounded to, counts; 0 for none.
+    /// Step that the readings are rounded to, counts.
     pub(crate) step_counts: f64,
 }
 
@@ -193,7 +193,7 @@ fn carried(p: &PoseMatrix, turned: Vec2) -> PoseMatrix {
 const BURN_IN: usize = 48;
 
 /// Filters one stretch. `used` says for each row what counts; without it all that is there does. `step_counts` is the
-/// step that the readings are rounded to, 0 for none.
+/// step that the readings are rounded to.
 pub(crate) fn filter(
     world: &World<'_>,
     rows: &[LogRow],
@@ -369,8 +369,6 @@ fn sense(
     usable: Used,
     instant: &mut Instant,
 ) {
-    // Readings are written to 0.1 counts.
-    const ROUNDING_COUNTS2: f64 = 1e-2 / 12.0;
     (instant.look, instant.uncut) = (outlook.look, outlook.mean);
     let noise = forecast.machine().noise;
     let mut slopes = outlook.slope;
@@ -386,7 +384,7 @@ fn sense(
         let pose_variance: f64 = (0..3)
             .map(|i| slope[i] * (p[i][0] * slope[0] + p[i][1] * slope[1] + p[i][2] * slope[2]))
             .sum();
-        let own_variance = noise.deviation(mean).powi(2) + ROUNDING_COUNTS2 + outlook.edge_variance[lane];
+        let own_variance = noise.deviation(mean).powi(2) + outlook.edge_variance[lane];
         let deviation = (own_variance + pose_variance).sqrt();
         let read = cut(
             mean,
@@ -399,9 +397,10 @@ fn sense(
             continue;
         }
         // The likelihood of what may be cut, by all that is known before.
-        let cut_likelihood = (step_counts == 0.0 && read.open < 1.0).then(|| {
+        let fine = step_counts < FINE * deviation;
+        let cut_likelihood = (fine && read.open < 1.0).then(|| {
             let moved: f64 = (0..3).map(|axis| slope[axis] * state.moved[axis]).sum();
-            likelihood_of_cut(row.readings[lane], mean + moved, deviation)
+            likelihood_of_cut(row.readings[lane], mean + moved, deviation, step_counts)
         });
         let slope = slope.map(|s| s * read.open);
         let rest = (read.variance - pose_variance * read.open * read.open).max(1e-3 * read.variance);

@@ -12,16 +12,18 @@ pub(crate) struct Cut {
 }
 
 /// The moments of a reading that is normal with this mean and standard deviation before it is rounded to multiples of
-/// `step` (0 for none) and cut to [0, inf). What is sure has a variance of `declared` ones all the same, by the declared
+/// `step` and cut to [0, inf). What is sure has a variance of `declared` ones all the same, by the declared
 /// model's standard deviation: one that followed the candidate's would make quiet readings likelier where all are 0.
 #[inline]
 pub(crate) fn cut(mean: f64, deviation: f64, step: f64, declared: f64) -> Cut {
     /// Variance of a reading that is surely 0, in units of the declared one's: it is then about twice as likely, like
     /// its probability, as one that is 0 half of the time, and one that is not 0 after all is no proof of the contrary.
     const SHUT: f64 = 0.16;
-    if step > 0.0 {
+    if step >= FINE * deviation && step > 0.0 {
         return rounded(mean, deviation, step, declared);
     }
+    // Sheppard's correction: the rounding of a finer step is as good as noise.
+    let deviation = (deviation * deviation + step * step / 12.0).sqrt();
     let z = mean / deviation;
     if z > 6.0 {
         return Cut {
@@ -76,13 +78,15 @@ impl Likelihood {
     }
 }
 
-/// The likelihood of a reading that is normal with this mean and standard deviation before it is cut to [0, inf) (Tobin 1958). That
-/// of the moments in its place is no longer greatest at the truth where most readings are 0.
+/// The likelihood of a reading that is normal with this mean and standard deviation before it is cut to [0, inf) (Tobin 1958) and
+/// rounded to multiples of a step that is [`FINE`]: what is less than half of it is 0. That of the moments in its
+/// place is no longer greatest at the truth where most readings are 0.
 #[inline]
-pub(crate) fn likelihood_of_cut(reading: f64, mean: f64, deviation: f64) -> Likelihood {
+pub(crate) fn likelihood_of_cut(reading: f64, mean: f64, deviation: f64, step: f64) -> Likelihood {
     /// Standard deviations below 0 from where on a mean is as good as any lower one: a reading that is not 0 after all is no
     /// proof of the contrary.
     const SHUT: f64 = 3.0;
+    let deviation = (deviation * deviation + step * step / 12.0).sqrt();
     let mean = mean.max(-SHUT * deviation);
     if reading > 0.0 {
         let z = (reading - mean) / deviation;
@@ -91,29 +95,18 @@ pub(crate) fn likelihood_of_cut(reading: f64, mean: f64, deviation: f64) -> Like
             square: z * z,
         };
     }
-    // Most sensors see no wall.
-    let shut = if mean == 0.0 {
-        0.5
-    } else {
-        0.5 * erfc(mean / deviation * std::f64::consts::FRAC_1_SQRT_2)
-    };
+    let shut = 0.5 * erfc((mean - 0.5 * step) / deviation * std::f64::consts::FRAC_1_SQRT_2);
     Likelihood {
         factor: shut * std::f64::consts::TAU.sqrt(),
         square: 0.0,
     }
 }
 
+/// Step, as a share of the standard deviation, below which rounding is as good as noise.
+pub(crate) const FINE: f64 = 0.5;
+
 /// The moments of [`cut`] for multiples k of a step, by the probabilities of reaching each.
 fn rounded(mean: f64, deviation: f64, step: f64, declared: f64) -> Cut {
-    if step < 0.5 * deviation {
-        // Sheppard's correction; the rounding of a finer step is as good as noise.
-        return cut(
-            mean,
-            (deviation * deviation + step * step / 12.0).sqrt(),
-            0.0,
-            declared,
-        );
-    }
     let sure = (((mean - 7.0 * deviation) / step).floor().max(0.0)) as usize;
     let most = (((mean + 7.0 * deviation) / step).ceil().max(0.0)) as usize + 1;
     let (mut first, mut second, mut open) = (0.0, 0.0, 0.0);
@@ -155,16 +148,16 @@ mod tests {
         const DEVIATION: f64 = 8.0;
         const STEP: f64 = 1e-3;
         let density = |reading: f64, mean: f64| {
-            likelihood_of_cut(reading, mean, DEVIATION).ln().exp() / std::f64::consts::TAU.sqrt()
+            likelihood_of_cut(reading, mean, DEVIATION, STEP).ln().exp() / std::f64::consts::TAU.sqrt()
         };
         // What is expected, over readings that have one mean, of something that depends on them.
         let expected = |mean: f64, of: &dyn Fn(f64) -> f64| {
-            let above = (0..80_000).map(|i| (f64::from(i) + 0.5) * STEP);
+            let above = (1..80_000).map(|i| f64::from(i) * STEP);
             density(0.0, mean) * of(0.0) + above.map(|y| STEP * density(y, mean) * of(y)).sum::<f64>()
         };
         for mean in [-20.0, -8.0, 0.0, 13.0] {
             assert!((expected(mean, &|_| 1.0) - 1.0).abs() < 1e-6, "{mean}");
-            let at = |guess: f64| expected(mean, &|y| likelihood_of_cut(y, guess, DEVIATION).ln());
+            let at = |guess: f64| expected(mean, &|y| likelihood_of_cut(y, guess, DEVIATION, STEP).ln());
             let slope = (at(mean + 0.01) - at(mean - 0.01)) / 0.02;
             assert!(slope.abs() < 1e-6, "{mean}: {slope}");
         }

@@ -72,7 +72,7 @@ pub(crate) fn p_among_repeats(
     const SURE: f64 = 50.0;
     let of_factor = |factor: &Factor| {
         let p = factor.p();
-        if p >= level || factor.gain > SURE && evidence.step_counts == 0.0 {
+        if p >= level || factor.gain > SURE && !evidence.is_coarse() {
             return p;
         }
         let logs = repeats(evidence, settings, |repeated| {

@@ -15,9 +15,7 @@ pub(crate) fn repeats<R: Send>(
 ) -> Vec<R> {
     const REPEATS: u64 = 8;
     let mut rounded = settings.to_vec();
-    if evidence.step_counts > 0.0 {
-        rounded.extend(find("reading-step").map(|spec| Setting::constant(spec, [evidence.step_counts])));
-    }
+    rounded.extend(find("reading-step").map(|spec| Setting::constant(spec, [evidence.step_counts])));
     let one = |repeat: u64| {
         let logs = simulated(evidence, &rounded, repeat)?;
         let runs: Vec<&[LogRow]> = logs.iter().map(Vec::as_slice).collect();

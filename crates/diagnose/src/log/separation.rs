@@ -6,6 +6,7 @@ use super::evidence::{Evidence, widened};
 use super::groups::unlisted_variants;
 use super::refine::{knobs_of, refine};
 use super::rows::LogRow;
+use super::steps::written_step;
 
 /// The distance in standard deviations, for these logs of a robot with the answer's effects, between the answer and a rival that
 /// is fitted to them. `None` for logs that cannot be followed.
@@ -20,7 +21,7 @@ pub fn log_separation(
     let (_, scene) = widened(model, scene).ok()?;
     let mut true_model = model.clone();
     true_model.effects.extend_from_slice(answer);
-    let masks = Evidence::new(&scene, &true_model, runs, 0.0).ok()?;
+    let masks = Evidence::new(&scene, &true_model, runs, written_step(runs)).ok()?;
     let evidence = Evidence { model, ..masks };
     let variants = [evidence.variants(), unlisted_variants()].concat();
     let knobs = knobs_of(rival, &variants);

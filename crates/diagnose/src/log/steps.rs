@@ -3,7 +3,7 @@
 use super::rows::LogRow;
 
 /// Step up to which whole counts tell nothing but how they were written.
-const WHOLE: f64 = 1.5;
+pub(crate) const WHOLE: f64 = 1.5;
 /// Readings looked at.
 const LOOKED_AT: usize = 4000;
 
@@ -29,6 +29,17 @@ pub(crate) fn reading_step(runs: &[&[LogRow]]) -> Option<f64> {
     let whole = some.iter().all(|reading| reading.fract() == 0.0);
     let step = sharpened(&readings, guess);
     (!whole || step > WHOLE).then_some(step)
+}
+
+/// The step to which the file writes readings that are not rounded otherwise, counts.
+pub(crate) fn written_step(runs: &[&[LogRow]]) -> f64 {
+    const TENTHS: f64 = 0.1;
+    let mut readings = (runs.iter().flat_map(|rows| rows.iter()).filter_map(LogRow::read)).flatten();
+    if readings.all(|reading| reading.fract() == 0.0) {
+        1.0
+    } else {
+        TENTHS
+    }
 }
 
 /// Whether all readings lie within the file's rounding of multiples of something near the guess, which is known no better where
@@ -93,6 +104,10 @@ mod tests {
         assert_eq!(reading_step(&[&rows(0.0)]), None);
         // Written without decimals.
         assert_eq!(reading_step(&[&rows(1.0)]), None);
+        assert_eq!(
+            [0.0, 1.0, 7.3].map(|step| written_step(&[&rows(step)])),
+            [0.1, 1.0, 0.1]
+        );
         let found = reading_step(&[&rows(2.0)]).unwrap();
         assert!((found - 2.0).abs() < 1e-6, "{found}");
     }
