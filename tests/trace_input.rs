@@ -1,6 +1,7 @@
 //! Data that are short, broken, or not the model's: a clear error or a clear statement, never a wrong name.
 
 use std::fs;
+use std::ops::Range;
 use std::path::PathBuf;
 
 use serde_json::Value;
@@ -57,7 +58,8 @@ fn two_laps_are_too_few() {
             "--no-cache",
             "--quiet",
         ],
-        "run set/b has 2 whole laps after its first: at least 3 in every run are needed to trace anything",
+        "run set/b has 2 whole laps after its first: at least 3 in every run are needed to trace anything; leave the \
+         run out of `runs` in dataset.toml, or measure it again",
     );
 }
 
@@ -131,15 +133,12 @@ fn a_run_whose_log_has_no_readings_has_the_mean_size_of_the_others() {
 }
 
 /// A log whose columns from `first` on are multiplied: no controller gives those commands, and nothing is named.
-fn in_other_units(columns: std::ops::Range<usize>, factor: f64) -> Value {
+fn in_other_units(columns: Range<usize>, factor: f64) -> Value {
     let scratch = Scratch::new();
     limping().logged(&[3; 2]).record(&scratch, "set");
     for run in ["set/run_a.csv", "set/run_b.csv"] {
-        rewrite(&scratch, run, |_, mut fields| {
-            for field in &mut fields[columns.clone()] {
-                *field = format!("{:.5}", factor * field.parse::<f64>().unwrap());
-            }
-            Some(fields)
+        with_columns(&scratch, run, columns.clone(), |value| {
+            format!("{:.5}", factor * value)
         });
     }
     let found = trace(&scratch, "braitenberg", "set", &[]);
@@ -177,6 +176,75 @@ fn positions_in_millimetres_are_refused() {
         "set/run_a.csv: 0 whole laps, and the first is not analysed: at least two are needed; check the world, the \
          driving direction ([declared] run.direction in dataset.toml) and the unit of x_m and y_m",
     );
+}
+
+/// Every position, reading or time of a file in these columns, changed.
+fn with_columns(scratch: &Scratch, run: &str, columns: Range<usize>, change: impl Fn(f64) -> String) {
+    rewrite(scratch, run, |_, mut fields| {
+        for field in &mut fields[columns.clone()] {
+            *field = change(field.parse().unwrap());
+        }
+        Some(fields)
+    });
+}
+
+#[test]
+fn times_in_milliseconds_are_refused() {
+    let scratch = Scratch::new();
+    few_laps(&[3]).record(&scratch, "set");
+    with_columns(&scratch, "set/run_a.csv", 0..1, |time_s| {
+        format!("{:.0}", 1000.0 * time_s)
+    });
+    let ran = try_trace(&scratch, "braitenberg", "set", &[]);
+    assert_eq!(ran.status, Some(2), "{}", ran.stderr);
+    let said = "the declared robot needs about 65 s at its speed: is t_s in seconds";
+    assert!(ran.stderr.contains(said), "{}", ran.stderr);
+}
+
+#[test]
+fn a_run_that_is_given_twice_is_refused() {
+    let scratch = Scratch::new();
+    few_laps(&[3; 2]).record(&scratch, "set");
+    for again in ["--measured", "--held-out"] {
+        let ran = try_trace(&scratch, "braitenberg", "set", &[again, "set"]);
+        assert_eq!(ran.status, Some(2), "{}", ran.stderr);
+        let said = "set/run_a.csv: the same run as set/run_a.csv; give each run once";
+        assert!(ran.stderr.contains(said), "{}", ran.stderr);
+    }
+}
+
+#[test]
+fn a_sighting_where_no_robot_gets_is_set_aside_and_said() {
+    share_signatures("braitenberg");
+    let scratch = Scratch::new();
+    limping().record(&scratch, "set");
+    rewrite(&scratch, "set/run_b.csv", |row, mut fields| {
+        if row == 3000 {
+            fields[1] = "57.3".to_owned();
+        }
+        Some(fields)
+    });
+    let found = trace(&scratch, "braitenberg", "set", &[]);
+    says(&found, "explained", &["wheel-asymmetry"]);
+    holds(&found["effects"][0], "ratio", LIMPING, 1.0);
+    let remark = found["remarks"][0].as_str().unwrap();
+    assert!(
+        remark.contains("set/run_b.csv: at t_s = 192.000 the robot is seen at (57.3, ")
+            && remark.ends_with("taken as not seen"),
+        "{remark}"
+    );
+}
+
+#[test]
+fn readings_in_whole_counts_are_those_that_the_controller_saw() {
+    let scratch = Scratch::new();
+    limping().logged(&[4; 2]).record(&scratch, "set");
+    for run in ["set/run_a.csv", "set/run_b.csv"] {
+        with_columns(&scratch, run, 3..11, |counts| format!("{counts:.0}"));
+    }
+    let found = trace(&scratch, "braitenberg", "set", &[]);
+    says(&found, "explained", &["wheel-asymmetry"]);
+    assert_eq!(found["logs"]["decide"]["verdict"], "as declared", "{found:#}");
 }
 
 #[test]
@@ -227,7 +295,11 @@ fn sets_with_different_declarations_are_traced_together() {
     assert_eq!(found["error"]["held_out"], held_out);
 
     // What is held out of the second set is held against simulations of the second declaration.
-    reactive.record(&scratch, "unseen");
+    let longer = Robot {
+        laps: vec![5; 2],
+        ..reactive
+    };
+    longer.record(&scratch, "unseen");
     let held_out = ["--measured", "reactive", "--held-out", "unseen"];
     let found = trace(&scratch, "braitenberg", "set", &held_out);
     assert_eq!(
