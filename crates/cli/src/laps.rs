@@ -11,6 +11,7 @@ use track::{Lap, LapTracker, Way};
 use crate::config::Config;
 use crate::dataset::{DataSet, RunFile};
 use crate::setup;
+use crate::strays::without_strays;
 
 /// The laps of one run that are analysed, and what was set aside.
 #[derive(Debug, Clone)]
@@ -176,69 +177,6 @@ fn seen(run: &RunFile) -> impl Iterator<Item = (f64, Vec2)> {
     rows.filter_map(|(&time_s, position)| position.map(|[x, y]| (time_s, Vec2::new(x, y))))
 }
 
-/// Takes sightings away where no robot can have been between those beside them, and says which.
-fn without_strays(run: &mut RunFile) -> Vec<String> {
-    let path = run.path.display().to_string();
-    let rows = &mut run.rows;
-    let say = |row: usize| {
-        let [x, y] = rows.position_m[row].unwrap_or([f64::NAN; 2]);
-        let time_s = rows.t_s[row];
-        format!(
-            "{path}: at t_s = {time_s:.3} the robot is seen at ({x}, {y}), where it cannot get from where it is seen \
-             before and after; taken as not seen"
-        )
-    };
-    let strays = strays(&rows.t_s, &rows.position_m);
-    let words = strays.iter().map(|&row| say(row)).collect();
-    for row in strays {
-        rows.position_m[row] = None;
-    }
-    words
-}
-
-/// The rows in which a robot is seen where it cannot get, and out of which it comes back; none if they are many, which is no
-/// fault of single sightings.
-fn strays(t_s: &[f64], position_m: &[Option<[f64; 2]>]) -> Vec<usize> {
-    /// A robot's speed at most, and how far sightings of it may be off.
-    const FAST_M_S: f64 = 0.2;
-    const OFF_M: f64 = 0.05;
-    /// Time within which it has come back, s, if not with the very next sighting.
-    const SOON_S: f64 = 0.6;
-    /// Share of the sightings that are many.
-    const MANY: f64 = 0.01;
-    let seen: Vec<(usize, f64, [f64; 2])> = (t_s.iter().zip(position_m).enumerate())
-        .filter_map(|(row, (&time_s, position))| position.map(|position_m| (row, time_s, position_m)))
-        .collect();
-    let gets = |a: usize, b: usize| {
-        let ((_, from_s, from), (_, to_s, to)) = (seen[a], seen[b]);
-        let way_m = (to[0] - from[0]).hypot(to[1] - from[1]);
-        way_m <= OFF_M + FAST_M_S * (to_s - from_s).abs()
-    };
-    let mut strays = Vec::new();
-    let mut last = 0;
-    if seen.len() > 2 && !gets(0, 1) && gets(1, 2) {
-        strays.push(seen[0].0);
-        last = 1;
-    }
-    let mut next = last + 1;
-    while next < seen.len() {
-        if !gets(last, next) {
-            let soon = |&later: &usize| later == next + 1 || seen[later].1 - seen[last].1 <= SOON_S;
-            let mut later = (next + 1..seen.len()).take_while(soon);
-            if let Some(back) = later.find(|&later| gets(last, later)) {
-                strays.extend(seen[next..back].iter().map(|(row, ..)| row));
-                next = back;
-            }
-        }
-        last = next;
-        next += 1;
-    }
-    if strays.len() as f64 > MANY * seen.len() as f64 {
-        return Vec::new();
-    }
-    strays
-}
-
 fn sample(set: &DataSet, run: &RunFile, circuit: &Circuit, way: Way) -> Result<SampledRun> {
     let mut tracker = LapTracker::new(&circuit.gates, way);
     let whole: Vec<Lap> = seen(run)
@@ -306,26 +244,6 @@ mod tests {
         };
         let whole: Vec<Lap> = (0..4).map(lap).collect();
         SampledRun::new("set", "a", &whole, 3, began_s)
-    }
-
-    #[test]
-    fn sightings_where_no_robot_gets_are_strays_if_it_comes_back() {
-        let t_s: Vec<f64> = (0..1000).map(|i| 0.064 * f64::from(i)).collect();
-        let way: Vec<Option<[f64; 2]>> = (0..1000).map(|i| Some([0.003 * f64::from(i), 0.5])).collect();
-        assert_eq!(strays(&t_s, &way), [0; 0]);
-        let mut seen = way.clone();
-        for row in [0, 400, 401, 700] {
-            seen[row] = Some([57.0, 0.5]);
-        }
-        seen[402] = None;
-        assert_eq!(strays(&t_s, &seen), [0, 400, 401, 700]);
-        // Carried elsewhere it does not come back.
-        let mut carried = way.clone();
-        carried[500..].iter_mut().flatten().for_each(|at| at[1] = 0.9);
-        assert_eq!(strays(&t_s, &carried), [0; 0]);
-        // Another unit is no fault of single sightings.
-        let millimetres: Vec<_> = way.iter().map(|at| at.map(|at| at.map(|m| 1000.0 * m))).collect();
-        assert_eq!(strays(&t_s, &millimetres), [0; 0]);
     }
 
     #[test]

@@ -17,6 +17,7 @@ mod ray_study;
 mod report;
 mod session;
 mod setup;
+mod strays;
 mod table;
 mod trace;
 

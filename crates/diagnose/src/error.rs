@@ -54,7 +54,8 @@ pub enum Error {
     NoScatter,
     /// Logs that cannot be followed.
     #[error(
-        "no stretch of 200 control steps with commands and camera positions can be followed: at least one run needs one"
+        "no stretch of 200 control steps with commands and camera positions can be followed, and at least one run needs one: look at \
+         the times (a row every control step, in s), at the positions (in m) and at the commands (in m/s) of its logs"
     )]
     NoLog,
     /// What the simulator says of the model.

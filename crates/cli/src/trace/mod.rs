@@ -14,7 +14,7 @@ mod unnamed;
 use std::ops::Range;
 use std::path::Path;
 
-use anyhow::{Result, ensure};
+use anyhow::{Context, Result, ensure};
 use diagnose::{Answer, Atlas, Baselines, Decided, Detectable, FourNumbers, LogRow, ObservedLap, Simulate};
 use sim::Setting;
 
@@ -139,7 +139,7 @@ impl Trace {
                     &watch,
                 );
                 interrupt::check()?;
-                let found = found?;
+                let found = found.with_context(|| recordings[place].measured.set.name.clone())?;
                 (found.before, doubted(found.answer()), Some(found))
             }
             None => {
