@@ -31,6 +31,9 @@ const MOST: f64 = 0.9;
 /// Share up to which an explanation does not stand that leaves what is not likely, be it not significant: of weak signals chance
 /// alone explains as much.
 const TOO_LITTLE: f64 = 0.7;
+/// Score from which one explains more than chance offers all the same, if what it leaves is no less likely than this.
+const CLEAR: f64 = 20.0;
+const CLEAR_P: f64 = 0.01;
 /// A share that is less by so much is as good.
 const AS_GOOD: f64 = 0.01;
 /// Log-likelihood that each number of a further effect must gain.
@@ -316,7 +319,8 @@ fn verdict_of(best: &Explanation) -> Verdict {
         return Verdict::Unexplained;
     }
     if suffices(best) {
-        return if is_doubtful(best, TOO_LITTLE) {
+        let clear = best.score >= CLEAR && leaves_more_likely_than(best, CLEAR_P);
+        return if is_doubtful(best, TOO_LITTLE) && !clear {
             Verdict::Unexplained
         } else {
             Verdict::Explained
