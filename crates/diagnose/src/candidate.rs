@@ -75,9 +75,9 @@ pub(crate) fn within(value: f64, param: &Param) -> f64 {
     }
 }
 
-/// How far a value of a parameter is from another, the shorter way round.
-pub(crate) fn apart(value: f64, other: f64, param: &Param) -> f64 {
-    match round(param) {
+/// How far a value is from another, the shorter way round if it is one of a parameter that goes round.
+pub(crate) fn apart(value: f64, other: f64, param: Option<&Param>) -> f64 {
+    match param.and_then(round) {
         Some(turn) => {
             let period = turn.end - turn.start;
             (value - other + 0.5 * period).rem_euclid(period) - 0.5 * period
@@ -103,6 +103,32 @@ pub(crate) fn take_mean_of_others(values: &mut [Vec<f64>], run: usize) {
     }
 }
 
+/// What one run tells of some values, with their standard errors.
+#[derive(Debug, Clone)]
+pub(crate) struct OfRun {
+    pub(crate) values: Vec<f64>,
+    pub(crate) errors: Vec<f64>,
+}
+
+/// Values and errors of all runs. Those that tell nothing have the mean of the others', with an error that holds how far these are
+/// apart; `None` if none tells anything.
+pub(crate) fn filled(runs: &[Option<OfRun>]) -> Option<Vec<OfRun>> {
+    let told: Vec<&OfRun> = runs.iter().flatten().collect();
+    let count = told.len() as f64;
+    let mean = |i: usize| told.iter().map(|run| run.values[i]).sum::<f64>() / count;
+    let error = |i: usize| {
+        let square = |run: &&OfRun| (run.values[i] - mean(i)).powi(2) + run.errors[i] * run.errors[i];
+        (told.iter().map(square).sum::<f64>() / count).sqrt()
+    };
+    let numbers = 0..told.first()?.values.len();
+    let unseen = OfRun {
+        values: numbers.clone().map(mean).collect(),
+        errors: numbers.map(error).collect(),
+    };
+    let each = |run: &Option<OfRun>| run.clone().unwrap_or_else(|| unseen.clone());
+    Some(runs.iter().map(each).collect())
+}
+
 #[cfg(test)]
 mod tests {
     use sim::find;
@@ -120,18 +146,35 @@ mod tests {
     }
 
     #[test]
+    fn a_run_that_tells_nothing_has_the_mean_and_an_error_that_holds_the_others() {
+        let of = |value: f64| {
+            Some(OfRun {
+                values: vec![value],
+                errors: vec![4.0],
+            })
+        };
+        let all = filled(&[of(7.0), None, of(13.0)]).unwrap();
+        let values: Vec<f64> = all.iter().map(|run| run.values[0]).collect();
+        assert_eq!(values, [7.0, 10.0, 13.0]);
+        // 3 off the mean and known to 4.
+        let errors: Vec<f64> = all.iter().map(|run| run.errors[0]).collect();
+        assert_eq!(errors, [4.0, 5.0, 4.0]);
+        assert!(filled(&[None, None]).is_none());
+    }
+
+    #[test]
     fn places_go_round_a_wall_and_sizes_stop_at_the_end_of_their_range() {
         let bump = find("wall-bump").unwrap();
         let param = |name: &str| bump.params.iter().find(|param| param.name == name).unwrap();
         assert!((within(-0.005, param("position")) - 0.995).abs() < 1e-12);
         assert!((within(1.005, param("position")) - 0.005).abs() < 1e-12);
-        assert!((apart(0.01, 0.99, param("position")) - 0.02).abs() < 1e-12);
-        assert!((apart(0.99, 0.01, param("position")) + 0.02).abs() < 1e-12);
+        assert!((apart(0.01, 0.99, Some(param("position"))) - 0.02).abs() < 1e-12);
+        assert!((apart(0.99, 0.01, Some(param("position"))) + 0.02).abs() < 1e-12);
         let azimuth = &find("floor-tilt").unwrap().params[1];
-        assert!((apart(-3.1, 3.1, azimuth) - (std::f64::consts::TAU - 6.2)).abs() < 1e-12);
-        assert!((apart(0.3, 0.1, azimuth) - 0.2).abs() < 1e-12);
+        assert!((apart(-3.1, 3.1, Some(azimuth)) - (std::f64::consts::TAU - 6.2)).abs() < 1e-12);
+        assert!((apart(0.3, 0.1, Some(azimuth)) - 0.2).abs() < 1e-12);
         let height = param("height_m");
-        assert!((apart(0.9, 0.1, height) - 0.8).abs() < 1e-12);
+        assert!((apart(0.9, 0.1, Some(height)) - 0.8).abs() < 1e-12);
         assert_eq!(within(height.high + 1.0, height), height.high);
     }
 }

@@ -110,6 +110,7 @@ impl Trace {
             laps[few.unwrap_or(0)].len()
         );
         let logged = with_logs(&recordings);
+        let mut remarks = remarks(&recordings, logged.as_ref());
         // Logs name the effect, and the laps judge it.
         let purpose = if logged.is_some() {
             Purpose::Judge
@@ -152,7 +153,6 @@ impl Trace {
         progress.message("simulating the error before and after");
         let errors = errors(&recordings, &answer, unseen, seed)?;
         interrupt::check()?;
-        let mut remarks = remarks(&recordings);
         if let Some(found) = &from_logs
             && matches!(found.logs.decide, Decided::NoController { .. })
         {
@@ -210,8 +210,8 @@ fn runs(recordings: &[Recording]) -> impl Iterator<Item = &SampledRun> {
     recordings.iter().flat_map(|recording| &recording.measured.runs)
 }
 
-/// What these data do not allow.
-fn remarks(recordings: &[Recording]) -> Vec<String> {
+/// What these data do not allow; `logged` are the logs that are used, with their recording.
+fn remarks(recordings: &[Recording], logged: Option<&(usize, Vec<Vec<LogRow>>)>) -> Vec<String> {
     let mut remarks = Vec::new();
     if runs(recordings).count() == 1 {
         remarks.push(
@@ -229,8 +229,7 @@ fn remarks(recordings: &[Recording]) -> Vec<String> {
             run.wanted
         ));
     }
-    let logged = with_logs(recordings);
-    if let Some((place, logs)) = &logged {
+    if let Some((place, logs)) = logged {
         for (run, rows) in recordings[*place].measured.runs.iter().zip(logs) {
             if !rows.iter().any(LogRow::tells) {
                 remarks.push(format!(
@@ -241,7 +240,7 @@ fn remarks(recordings: &[Recording]) -> Vec<String> {
             }
         }
     }
-    let used = logged.map(|(place, _)| place);
+    let used = logged.map(|(place, _)| *place);
     for (place, recording) in recordings.iter().enumerate() {
         let set = &recording.measured.set;
         let count = set.runs.iter().filter(|run| run.rows.log.is_some()).count();

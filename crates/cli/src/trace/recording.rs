@@ -41,8 +41,7 @@ pub(crate) struct RunPlace {
 fn in_seconds(measured: &Measured, setup: &Setup) -> Result<()> {
     /// A robot that turns on the spot needs longer than the midline's length at its speed says.
     const TIMES: f64 = 5.0;
-    let midline_m = setup.scene.circuit().gates.midline_length_m();
-    let declared_s = midline_m / setup.model.machine.controller.speed_m_s();
+    let declared_s = setup.scene.world(&setup.model, 0)?.nominal_lap_s();
     for (run, file) in measured.runs.iter().zip(&measured.set.runs) {
         let times_s = run.lap_times_s();
         let lap_s = times_s.iter().sum::<f64>() / times_s.len() as f64;

@@ -224,11 +224,7 @@ impl Part {
                 .find(|free| free.0 == i)
                 .map_or(0.0, |free| free.1)
         };
-        let off = |i: usize| {
-            let (value, other) = (self.values[0][i], other.values[0][i]);
-            let param = probe.spec.params.get(i);
-            param.map_or(value - other, |param| apart(value, other, param))
-        };
+        let off = |i: usize| apart(self.values[0][i], other.values[0][i], probe.spec.params.get(i));
         let near = |i: usize| off(i).abs() <= step(i);
         probe.spec == atlas.probes[other.probe].spec
             && [self.shape, other.shape] == [Shape::Constant; 2]
@@ -567,10 +563,9 @@ impl Hypothesis {
 
     /// How far one number is from what it is in another hypothesis of the same parts.
     pub(super) fn apart(&self, other: &Self, freedom: &Freedom, atlas: &Atlas) -> f64 {
-        let (value, other) = (self.get(freedom), other.get(freedom));
         let spec = atlas.probes[self.parts[freedom.part].probe].spec;
         let param = freedom.parameter.and_then(|i| spec.params.get(i));
-        param.map_or(value - other, |param| apart(value, other, param))
+        apart(self.get(freedom), other.get(freedom), param)
     }
 
     /// This hypothesis with some numbers moved; each stays in its parameter's range.

@@ -6,6 +6,7 @@ use sim::{Controller, Model, Pattern, Setting, find};
 
 use super::rows::LogRow;
 use crate::Candidate;
+use crate::candidate::{OfRun, filled};
 
 /// What the logged commands say of the controller.
 #[derive(Debug, Clone, PartialEq)]
@@ -146,7 +147,7 @@ fn beyond_limit(model: &Model, runs: &[&[LogRow]]) -> f64 {
 }
 
 /// The power of ten, at most 1, that all readings of a log are multiples of.
-fn written_counts(rows: &[LogRow]) -> f64 {
+pub(crate) fn written_counts(rows: &[LogRow]) -> f64 {
     const DECIMALS: std::ops::RangeInclusive<i32> = 0..=6;
     let all_are_multiples = |decimals: &i32| {
         let scale = 10.0_f64.powi(*decimals);
@@ -358,15 +359,15 @@ fn candidate(
             vec![error, error / RUN_S],
         )
     } else if differ {
-        let square = |run: &Relative| (run.line[0] - start).powi(2) + run.error * run.error;
-        let unseen = Relative {
-            line: [start, 0.0],
-            error: (told.iter().map(square).sum::<f64>() / told.len() as f64).sqrt(),
+        let of_run = |run: &Relative| OfRun {
+            values: vec![run.line[0]],
+            errors: vec![run.error],
         };
-        let each = || factors.iter().map(|run| run.unwrap_or(unseen));
+        let runs: Vec<Option<OfRun>> = factors.iter().map(|run| run.as_ref().map(of_run)).collect();
+        let all = filled(&runs)?;
         (
-            Pattern::ByRun(each().map(|run| vec![run.line[0]]).collect()),
-            each().map(|run| run.error).collect(),
+            Pattern::ByRun(all.iter().map(|run| run.values.clone()).collect()),
+            all.into_iter().flat_map(|run| run.errors).collect(),
         )
     } else {
         (Pattern::Constant(vec![start]), vec![error])

@@ -22,8 +22,7 @@ pub(crate) fn cut(mean: f64, deviation: f64, step: f64, declared: f64) -> Cut {
     if step >= FINE * deviation && step > 0.0 {
         return rounded(mean, deviation, step, declared);
     }
-    // Sheppard's correction: the rounding of a finer step is as good as noise.
-    let deviation = (deviation * deviation + step * step / 12.0).sqrt();
+    let deviation = blurred(deviation, step);
     let z = mean / deviation;
     if z > 6.0 {
         return Cut {
@@ -86,7 +85,7 @@ pub(crate) fn likelihood_of_cut(reading: f64, mean: f64, deviation: f64, step: f
     /// Standard deviations below 0 from where on a mean is as good as any lower one: a reading that is not 0 after all is no
     /// proof of the contrary.
     const SHUT: f64 = 3.0;
-    let deviation = (deviation * deviation + step * step / 12.0).sqrt();
+    let deviation = blurred(deviation, step);
     let mean = mean.max(-SHUT * deviation);
     if reading > 0.0 {
         let z = (reading - mean) / deviation;
@@ -100,6 +99,12 @@ pub(crate) fn likelihood_of_cut(reading: f64, mean: f64, deviation: f64, step: f
         factor: shut * std::f64::consts::TAU.sqrt(),
         square: 0.0,
     }
+}
+
+/// A standard deviation with that of rounding to a fine step, which is as good as noise (Sheppard's correction).
+#[inline]
+fn blurred(deviation: f64, step: f64) -> f64 {
+    (deviation * deviation + step * step / 12.0).sqrt()
 }
 
 /// Step, as a share of the standard deviation, below which rounding is as good as noise.

@@ -11,7 +11,7 @@ use super::leads::{By, Lead, price, trusted};
 use super::noise::{factor_again, is_noise};
 use super::refine::{Fitted, hunt, jumps, knobs, knobs_of, one_step, refine};
 use super::repeat::repeats;
-use crate::candidate::apart;
+use crate::candidate::{OfRun, apart, filled};
 
 /// A candidate with its best values and their pattern.
 #[derive(Debug, Clone)]
@@ -104,11 +104,8 @@ impl Refined {
         });
         for (i, (setting, errors)) in self.settings.iter().zip(&mut self.standard_errors).enumerate() {
             for (j, (value, error)) in numbers(setting).iter().zip(errors).enumerate() {
-                let off = |fitted: f64| match setting.spec.params.get(j) {
-                    Some(param) => apart(fitted, *value, param),
-                    None => fitted - value,
-                };
-                let square = |fit: &Vec<Setting>| off(numbers(&fit[i])[j]).powi(2);
+                let param = setting.spec.params.get(j);
+                let square = |fit: &Vec<Setting>| apart(numbers(&fit[i])[j], *value, param).powi(2);
                 let mean = fits.iter().map(square).sum::<f64>() / fits.len() as f64;
                 if *error > 0.0 {
                     *error = error.max(mean.sqrt());
@@ -226,8 +223,7 @@ fn spread_errors(setting: &Setting, number: usize, fitted: &Fitted) -> Vec<f64> 
     errors
 }
 
-/// One candidate of what was fitted to each run alone. Runs of which the log does not tell the size have the mean of the others',
-/// with an error that holds how far these are apart; `None` if none of them tells it.
+/// One candidate of what was fitted to each run alone, [`filled`] where the log does not tell the size; `None` if no log does.
 fn by_runs(
     evidence: &Evidence<'_>,
     variant: &Variant,
@@ -235,33 +231,19 @@ fn by_runs(
     parts: &[Fitted],
     base: &[f64],
 ) -> Option<Refined> {
-    let errors_of = |part: &Fitted| spread_errors(&part.settings[0], 0, part);
-    let told: Vec<(usize, Vec<f64>, Vec<f64>)> = (runs.iter().zip(parts))
-        .map(|(&run, part)| (run, numbers(&part.settings[0]), errors_of(part)))
-        .filter(|(.., errors)| errors.iter().all(|error| error.is_finite()))
-        .collect();
-    let (_, first, _) = told.first()?;
-    let count = told.len() as f64;
-    let mean = |i: usize| told.iter().map(|(_, values, _)| values[i]).sum::<f64>() / count;
-    let means: Vec<f64> = (0..first.len()).map(mean).collect();
-    let error = |i: usize| {
-        let square = |(_, values, errors): &(usize, Vec<f64>, Vec<f64>)| {
-            (values[i] - means[i]).powi(2) + errors[i] * errors[i]
-        };
-        (told.iter().map(square).sum::<f64>() / count).sqrt()
-    };
-    let mut values = vec![means.clone(); evidence.measured_runs];
-    let mut errors = vec![(0..first.len()).map(error).collect::<Vec<f64>>(); evidence.measured_runs];
-    for (run, own_values, own_errors) in &told {
-        values[*run].clone_from(own_values);
-        errors[*run].clone_from(own_errors);
+    let mut told = vec![None; evidence.measured_runs];
+    for (&run, part) in runs.iter().zip(parts) {
+        let errors = spread_errors(&part.settings[0], 0, part);
+        let values = numbers(&part.settings[0]);
+        told[run] = (errors.iter().all(|error| error.is_finite())).then_some(OfRun { values, errors });
     }
+    let all = filled(&told)?;
     Some(Refined {
         settings: vec![Setting {
             spec: variant.spec,
-            pattern: Pattern::ByRun(values),
+            pattern: Pattern::ByRun(all.iter().map(|run| run.values.clone()).collect()),
         }],
-        standard_errors: vec![errors.concat()],
+        standard_errors: vec![all.into_iter().flat_map(|run| run.errors).collect()],
         gain: parts.iter().map(|part| part.log_likelihood).sum::<f64>() - base.iter().sum::<f64>(),
         fitted: parts.iter().map(|part| part.knobs.len()).sum(),
         by: By::Run,

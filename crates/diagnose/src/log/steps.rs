@@ -1,5 +1,6 @@
 //! The multiples to which readings were rounded, by looking at the values that occur.
 
+use super::decide::written_counts;
 use super::rows::LogRow;
 
 /// Step up to which whole counts tell nothing but how they were written.
@@ -34,12 +35,8 @@ pub(crate) fn reading_step(runs: &[&[LogRow]]) -> Option<f64> {
 /// The step to which the file writes readings that are not rounded otherwise, counts.
 pub(crate) fn written_step(runs: &[&[LogRow]]) -> f64 {
     const TENTHS: f64 = 0.1;
-    let mut readings = (runs.iter().flat_map(|rows| rows.iter()).filter_map(LogRow::read)).flatten();
-    if readings.all(|reading| reading.fract() == 0.0) {
-        1.0
-    } else {
-        TENTHS
-    }
+    let finest = runs.iter().map(|rows| written_counts(rows)).fold(1.0, f64::min);
+    finest.max(TENTHS)
 }
 
 /// Whether all readings lie within the file's rounding of multiples of something near the guess, which is known no better where
