@@ -30,6 +30,28 @@ impl Candidate {
     pub fn label(&self) -> String {
         label(&self.setting)
     }
+
+    /// Gives a size by run that was fitted to the runs `seen` among so many to all of them.
+    pub(crate) fn spread_over(&mut self, seen: &Range<usize>, runs: usize) {
+        if let Pattern::ByRun(values) = &mut self.setting.pattern {
+            let errors = self.standard_errors.chunks(values[0].len()).map(<[f64]>::to_vec);
+            let all = in_all_runs(values.iter().cloned().zip(errors), seen, runs);
+            (*values, self.standard_errors) = (
+                values_of(&all),
+                all.into_iter().flat_map(|run| run.errors).collect(),
+            );
+        }
+    }
+}
+
+/// Gives a size by run of the runs `seen` among so many to all of them.
+pub(crate) fn spread_over(setting: &mut Setting, seen: &Range<usize>, runs: usize) {
+    if let Pattern::ByRun(values) = &mut setting.pattern {
+        let exact = values
+            .iter()
+            .map(|values| (values.clone(), vec![0.0; values.len()]));
+        *values = values_of(&in_all_runs(exact, seen, runs));
+    }
 }
 
 /// An effect with what tells it from others of its name, and its pattern.
@@ -127,6 +149,23 @@ pub(crate) fn filled(runs: &[Option<OfRun>]) -> Option<Vec<OfRun>> {
     };
     let each = |run: &Option<OfRun>| run.clone().unwrap_or_else(|| unseen.clone());
     Some(runs.iter().map(each).collect())
+}
+
+/// What the runs `seen` among so many tell, values and errors, [`filled`] for all.
+fn in_all_runs(
+    told: impl Iterator<Item = (Vec<f64>, Vec<f64>)>,
+    seen: &Range<usize>,
+    runs: usize,
+) -> Vec<OfRun> {
+    let mut all = vec![None; runs];
+    for (run, (values, errors)) in seen.clone().zip(told) {
+        all[run] = Some(OfRun { values, errors });
+    }
+    filled(&all).unwrap_or_default()
+}
+
+fn values_of(runs: &[OfRun]) -> Vec<Vec<f64>> {
+    runs.iter().map(|run| run.values.clone()).collect()
 }
 
 #[cfg(test)]

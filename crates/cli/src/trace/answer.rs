@@ -7,7 +7,7 @@ use diagnose::{
     Answer, Atlas, Explanation, FourNumbers, LogDiagnosis, LogRow, ObservedLap, Simulate, Verdict, Watch,
     diagnose_logs,
 };
-use sim::{Pattern, Setting, Vec2, WheelSpeeds};
+use sim::{Vec2, WheelSpeeds};
 
 use crate::dataset::{DataSet, RunFile};
 use crate::setup::Setup;
@@ -61,7 +61,7 @@ pub(crate) fn from_logs(
     let runs: Vec<&[LogRow]> = rows.iter().map(Vec::as_slice).collect();
     let mut logs = diagnose_logs(&setup.model, &setup.scene, &runs, watch)?;
     watch("whether the laps agree");
-    spread(&mut logs.answer, &logged, laps.len());
+    logs.answer.spread_over(&logged, laps.len());
     let (before, after) = atlas.confirm(simulate, laps, &logs.answer.settings())?;
     // Where the logs claim nothing there is nothing to agree with.
     let confirmed = logs.answer.verdict == Verdict::Unexplained
@@ -74,54 +74,6 @@ pub(crate) fn from_logs(
         after,
         confirmed,
     })
-}
-
-/// Makes an answer that was found from some of the runs one for all: a size by run is the mean of the others' where none was
-/// fitted, and runs that no fit saw have nothing to be left out.
-fn spread(answer: &mut Answer, logged: &Range<usize>, runs: usize) {
-    if logged.len() == runs {
-        return;
-    }
-    for candidate in answer.explanations.iter_mut().flat_map(|e| &mut e.effects) {
-        if let Pattern::ByRun(values) = &candidate.setting.pattern {
-            let of_run = values[0].len();
-            let errors: Vec<Vec<f64>> = candidate
-                .standard_errors
-                .chunks(of_run)
-                .map(<[f64]>::to_vec)
-                .collect();
-            candidate.standard_errors = over_runs(&errors, logged, runs).concat();
-        }
-        candidate.setting = setting_over_runs(&candidate.setting, logged, runs);
-    }
-    let whole = answer.settings();
-    let own = std::mem::take(&mut answer.left_out);
-    answer.left_out = vec![whole; runs];
-    for (run, settings) in logged.clone().zip(own) {
-        answer.left_out[run] = (settings.iter())
-            .map(|s| setting_over_runs(s, logged, runs))
-            .collect();
-    }
-}
-
-fn setting_over_runs(setting: &Setting, logged: &Range<usize>, runs: usize) -> Setting {
-    let pattern = match &setting.pattern {
-        Pattern::ByRun(values) => Pattern::ByRun(over_runs(values, logged, runs)),
-        other => other.clone(),
-    };
-    Setting {
-        spec: setting.spec,
-        pattern,
-    }
-}
-
-/// Lists of some of the runs as lists of all: the others get the mean.
-fn over_runs(values: &[Vec<f64>], some: &Range<usize>, runs: usize) -> Vec<Vec<f64>> {
-    let mean = |i: usize| values.iter().map(|v| v[i]).sum::<f64>() / values.len() as f64;
-    let mean: Vec<f64> = (0..values[0].len()).map(mean).collect();
-    let mut all = vec![mean; runs];
-    all[some.clone()].clone_from_slice(values);
-    all
 }
 
 impl FromLogs {
@@ -144,15 +96,4 @@ impl FromLogs {
 /// The sets of names among the explanations that the data do not tell apart, the answer's first.
 pub(crate) fn rivals(answer: &Answer) -> &[Explanation] {
     &answer.explanations[..answer.indistinguishable]
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn runs_without_a_log_get_the_mean_size_of_those_with_one() {
-        let all = over_runs(&[vec![1.0], vec![3.0]], &(1..3), 4);
-        assert_eq!(all, [[2.0], [1.0], [3.0], [2.0]]);
-    }
 }

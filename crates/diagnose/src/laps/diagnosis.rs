@@ -5,7 +5,6 @@ use std::sync::OnceLock;
 use sim::{Pattern, Setting};
 
 use super::atlas::{Atlas, Simulate};
-use super::classes::most_probable_first;
 use super::hypothesis::Hypothesis;
 use super::memo::Memo;
 use super::observed::ObservedLap;
@@ -144,7 +143,7 @@ impl Atlas {
         if verdict == Verdict::Explained {
             let equal = found[..indistinguishable].iter();
             let equal = equal.take_while(|found| suffices(&found.explanation)).count();
-            most_probable_first(&mut found[..equal]);
+            self.most_probable_first(&mut found[..equal]);
         }
         let (mut left_out, mut cause) = (vec![Vec::new(); runs.len()], None);
         if verdict != Verdict::Unexplained

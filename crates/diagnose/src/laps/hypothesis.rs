@@ -536,6 +536,31 @@ impl Hypothesis {
         self.freedoms(atlas).len() + held.count()
     }
 
+    /// The shares that data leave, with these errors, of what robots of this kind do, one for each number: their product is the Occam
+    /// factor of Laplace's approximation of how probable the data are where only these ranges are known beforehand (Kass and
+    /// Raftery 1995). Of sizes by run their mean counts, and no change in time: how far robots change is less known.
+    pub(super) fn shares_left(&self, errors: &[(Freedom, f64)], atlas: &Atlas) -> Vec<f64> {
+        let moved = errors.iter().filter_map(|(freedom, error)| {
+            let part = &self.parts[freedom.part];
+            let probe = &atlas.probes[part.probe];
+            let number = probe
+                .free
+                .iter()
+                .position(|free| Some(free.0) == freedom.parameter)?;
+            let error = match freedom.run {
+                Some(0) => error / (part.values.len() as f64).sqrt(),
+                Some(_) => return None,
+                None => *error,
+            };
+            Some(share_left(error, freedom.quantum, probe.range_of(number)))
+        });
+        let held = self.parts.iter().filter_map(|part| {
+            let range = atlas.probes[part.probe].range_of(0);
+            Some(share_left(part.held?, None, range))
+        });
+        moved.chain(held).collect()
+    }
+
     /// The numbers that a descent may change.
     pub(super) fn freedoms(&self, atlas: &Atlas) -> Vec<Freedom> {
         self.parts
@@ -589,6 +614,13 @@ impl Hypothesis {
     }
 }
 
+/// Mean over its range of the likelihood of a number with a standard error, of which the greatest is one. Of numbers that come in
+/// steps there is nothing between them.
+fn share_left(error: f64, step: Option<f64>, range: f64) -> f64 {
+    let left = (std::f64::consts::TAU.sqrt() * error).max(step.unwrap_or(0.0));
+    (left / range).min(1.0)
+}
+
 /// The squares by which values with errors differ from their weighted mean.
 fn differ(values: &[(f64, f64)]) -> Quadratic {
     let weight = |error: f64| error.powi(-2);
@@ -605,6 +637,22 @@ fn differ(values: &[(f64, f64)]) -> Quadratic {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_likelihood_leaves_its_mean_over_the_range() {
+        let mean_over = |error: f64, numbers: &[f64]| {
+            let total: f64 = numbers.iter().map(|x| (-0.5 * (x / error).powi(2)).exp()).sum();
+            total / numbers.len() as f64
+        };
+        let all: Vec<f64> = (0..100_000).map(|k| (f64::from(k) - 5e4) * 1e-4).collect();
+        assert!((share_left(0.1, None, 10.0) - mean_over(0.1, &all)).abs() < 1e-6);
+        let ten: Vec<f64> = (0..10).map(|k| (f64::from(k) - 3.0) * 0.032).collect();
+        for error in [0.001, 0.04] {
+            let share = share_left(error, Some(0.032), 0.32);
+            assert!((share - mean_over(error, &ten)).abs() < 0.02, "{error}: {share}");
+        }
+        assert_eq!(share_left(20.0, None, 10.0), 1.0);
+    }
 
     #[test]
     fn values_differ_by_their_squares_about_the_weighted_mean() {

@@ -86,6 +86,30 @@ impl Probe {
         }
     }
 
+    /// How far one of its free numbers goes among robots of this kind: sizes as far as those that are simulated beforehand, a
+    /// place as far as the choice among places leaves it.
+    pub(super) fn range_of(&self, number: usize) -> f64 {
+        let (parameter, step) = self.free[number];
+        if self.spec.params[parameter].name == "azimuth_rad" {
+            return std::f64::consts::TAU;
+        }
+        if number > 0 && !self.is_vector() {
+            return step / STEP;
+        }
+        let nothing = (!self.limit).then_some(self.neutral);
+        let sizes = || self.sizes.iter().copied().chain(nothing);
+        let largest = sizes().fold(f64::NEG_INFINITY, f64::max);
+        let smallest = sizes().fold(f64::INFINITY, f64::min);
+        let mirrored = if self.odd { 2.0 } else { 1.0 };
+        mirrored * (largest - smallest)
+    }
+
+    /// Whether its size is a length in a direction, of which both components are fitted.
+    fn is_vector(&self) -> bool {
+        let has_neutral = |(parameter, _): &(usize, f64)| self.spec.params[*parameter].neutral.is_some();
+        self.free.len() == 2 && self.free.iter().all(has_neutral)
+    }
+
     /// Whether it acts at a place of a wall; place and length are fitted with the size.
     pub(super) fn has_place(&self) -> bool {
         self.spec.params.iter().any(|param| param.name == "position")
@@ -333,4 +357,36 @@ pub(super) fn probes() -> Vec<Probe> {
         groups(),
     ]
     .concat()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ranges_span_the_sizes_on_both_sides_of_nothing() {
+        let range = |name: &str, number: usize| {
+            let probes = probes();
+            let found = probes.iter().find(|probe| probe.spec.name == name);
+            found.map(|probe| probe.range_of(number))
+        };
+        let is = |name: &str, number: usize, expected: f64| {
+            let found = range(name, number).expect("the effect is tried");
+            assert!((found - expected).abs() < 1e-12, "{name} {number}: {found}");
+        };
+        is("reading-gain", 0, 0.7);
+        is("crosstalk", 0, 0.2);
+        is("ambient-offset", 0, 130.0);
+        is("acceleration-limit", 0, 1.46);
+        // Mirror images are not simulated; the middle of a factor is one.
+        is("camera-scale", 0, 0.016);
+        is("camera-offset", 0, 0.004);
+        is("camera-offset", 1, 0.004);
+        is("marker-offset", 1, 0.024);
+        is("directional-light", 0, 25.0);
+        is("directional-light", 1, std::f64::consts::TAU);
+        // Twenty-four places a wall, chosen before.
+        is("wall-bump", 1, 0.008 / STEP);
+        is("wall-bump", 0, 0.024);
+    }
 }
