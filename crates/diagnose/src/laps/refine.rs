@@ -232,7 +232,7 @@ impl Atlas {
         } = &descent;
         let sets = self.enough(round.sets_of_a_step(), 1);
         if let Some(likeliest) = self.likeliest(simulate, data, hypothesis, freedoms, &local, sets) {
-            return Some(self.climbed(descent, &likeliest, full));
+            return Some(self.climbed(descent, &likeliest, round));
         }
         local.sides.clear();
         let nearest = self.nearest(data, &local.center, &local.scatter, &local.columns, freedoms, &[]);
@@ -287,7 +287,8 @@ impl Atlas {
     }
 
     /// A descent of one number moved to where the likelihood is highest about it.
-    fn climbed(&self, descent: Descent, to: &Likeliest, full: bool) -> Descent {
+    fn climbed(&self, descent: Descent, to: &Likeliest, round: Round) -> Descent {
+        let full = round == Round::Full;
         let mut freedoms = descent.freedoms;
         let hypothesis = descent.hypothesis.moved(self, &[(freedoms[0], to.moved)]);
         // Points one and a half errors away tell most of a top.
@@ -301,7 +302,8 @@ impl Atlas {
             near: None,
             looks: descent.looks + 1,
             holds: false,
-            rests: to.is_near,
+            // With so few data sets a top may be anywhere.
+            rests: to.is_near && round != Round::Rough,
             found: full && to.is_near,
             end: None,
             errors: vec![to.error],
