@@ -35,11 +35,9 @@ impl Candidate {
     pub(crate) fn spread_over(&mut self, seen: &Range<usize>, runs: usize) {
         if let Pattern::ByRun(values) = &mut self.setting.pattern {
             let errors = self.standard_errors.chunks(values[0].len()).map(<[f64]>::to_vec);
-            let all = in_all_runs(values.iter().cloned().zip(errors), seen, runs);
-            (*values, self.standard_errors) = (
-                values_of(&all),
-                all.into_iter().flat_map(|run| run.errors).collect(),
-            );
+            if let Some(all) = in_all_runs(values.iter().cloned().zip(errors), seen, runs) {
+                (*values, self.standard_errors) = all;
+            }
         }
     }
 }
@@ -50,7 +48,9 @@ pub(crate) fn spread_over(setting: &mut Setting, seen: &Range<usize>, runs: usiz
         let exact = values
             .iter()
             .map(|values| (values.clone(), vec![0.0; values.len()]));
-        *values = values_of(&in_all_runs(exact, seen, runs));
+        if let Some((all, _)) = in_all_runs(exact, seen, runs) {
+            *values = all;
+        }
     }
 }
 
@@ -80,7 +80,7 @@ pub(crate) fn label(setting: &Setting) -> String {
 }
 
 /// Where a parameter goes round: the range that holds each of its values once. Angles and places on a closed wall do.
-fn round(param: &Param) -> Option<Range<f64>> {
+pub(crate) fn round(param: &Param) -> Option<Range<f64>> {
     const PI: f64 = std::f64::consts::PI;
     match param.name {
         "position" => Some(0.0..1.0),
@@ -132,9 +132,9 @@ pub(crate) struct OfRun {
     pub(crate) errors: Vec<f64>,
 }
 
-/// Values and errors of all runs. Those that tell nothing have the mean of the others', with an error that holds how far these are
-/// apart; `None` if none tells anything.
-pub(crate) fn filled(runs: &[Option<OfRun>]) -> Option<Vec<OfRun>> {
+/// The values of all runs, run by run, and their errors in a row, as a [`Candidate`] has them. Runs that tell nothing have the mean of
+/// the others, with an error that holds how far these are apart; `None` if none tells anything.
+pub(crate) fn filled(runs: &[Option<OfRun>]) -> Option<(Vec<Vec<f64>>, Vec<f64>)> {
     let told: Vec<&OfRun> = runs.iter().flatten().collect();
     let count = told.len() as f64;
     let mean = |i: usize| told.iter().map(|run| run.values[i]).sum::<f64>() / count;
@@ -147,8 +147,11 @@ pub(crate) fn filled(runs: &[Option<OfRun>]) -> Option<Vec<OfRun>> {
         values: numbers.clone().map(mean).collect(),
         errors: numbers.map(error).collect(),
     };
-    let each = |run: &Option<OfRun>| run.clone().unwrap_or_else(|| unseen.clone());
-    Some(runs.iter().map(each).collect())
+    let all = || runs.iter().map(|run| run.as_ref().unwrap_or(&unseen));
+    Some((
+        all().map(|run| run.values.clone()).collect(),
+        all().flat_map(|run| run.errors.iter().copied()).collect(),
+    ))
 }
 
 /// What the runs `seen` among so many tell, values and errors, [`filled`] for all.
@@ -156,16 +159,12 @@ fn in_all_runs(
     told: impl Iterator<Item = (Vec<f64>, Vec<f64>)>,
     seen: &Range<usize>,
     runs: usize,
-) -> Vec<OfRun> {
+) -> Option<(Vec<Vec<f64>>, Vec<f64>)> {
     let mut all = vec![None; runs];
     for (run, (values, errors)) in seen.clone().zip(told) {
         all[run] = Some(OfRun { values, errors });
     }
-    filled(&all).unwrap_or_default()
-}
-
-fn values_of(runs: &[OfRun]) -> Vec<Vec<f64>> {
-    runs.iter().map(|run| run.values.clone()).collect()
+    filled(&all)
 }
 
 #[cfg(test)]
@@ -192,11 +191,9 @@ mod tests {
                 errors: vec![4.0],
             })
         };
-        let all = filled(&[of(7.0), None, of(13.0)]).unwrap();
-        let values: Vec<f64> = all.iter().map(|run| run.values[0]).collect();
-        assert_eq!(values, [7.0, 10.0, 13.0]);
+        let (values, errors) = filled(&[of(7.0), None, of(13.0)]).unwrap();
+        assert_eq!(values, [[7.0], [10.0], [13.0]]);
         // 3 off the mean and known to 4.
-        let errors: Vec<f64> = all.iter().map(|run| run.errors[0]).collect();
         assert_eq!(errors, [4.0, 5.0, 4.0]);
         assert!(filled(&[None, None]).is_none());
     }

@@ -3,6 +3,7 @@
 use sim::{Pattern, Setting, Spec, find};
 
 use super::groups::groups;
+use crate::candidate::round;
 
 /// One way in which one effect may act: a line through its parameters, from the neutral values outwards.
 #[derive(Debug, Clone)]
@@ -90,11 +91,11 @@ impl Probe {
     /// place as far as the choice among places leaves it.
     pub(super) fn range_of(&self, number: usize) -> f64 {
         let (parameter, step) = self.free[number];
-        if self.spec.params[parameter].name == "azimuth_rad" {
-            return std::f64::consts::TAU;
-        }
-        if number > 0 && !self.is_vector() {
+        if !self.fits_direction() && number > 0 {
             return step / STEP;
+        }
+        if let Some(turn) = round(&self.spec.params[parameter]) {
+            return turn.end - turn.start;
         }
         let nothing = (!self.limit).then_some(self.neutral);
         let sizes = || self.sizes.iter().copied().chain(nothing);
@@ -104,10 +105,9 @@ impl Probe {
         mirrored * (largest - smallest)
     }
 
-    /// Whether its size is a length in a direction, of which both components are fitted.
-    fn is_vector(&self) -> bool {
-        let has_neutral = |(parameter, _): &(usize, f64)| self.spec.params[*parameter].neutral.is_some();
-        self.free.len() == 2 && self.free.iter().all(has_neutral)
+    /// Whether a direction is fitted with its size, which is then no choice among probes.
+    pub(super) fn fits_direction(&self) -> bool {
+        self.free.len() == 2
     }
 
     /// Whether it acts at a place of a wall; place and length are fitted with the size.

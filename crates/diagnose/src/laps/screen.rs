@@ -93,8 +93,7 @@ impl Atlas {
             .iter()
             .filter(|p| p.spec == chosen.spec && *p.spec != UNLISTED)
             .count();
-        if chosen.free.len() == 2 {
-            // A direction is fitted.
+        if chosen.fits_direction() {
             return 0.0;
         }
         (alike.max(1) as f64).ln()

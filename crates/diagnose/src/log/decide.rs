@@ -364,11 +364,8 @@ fn candidate(
             errors: vec![run.error],
         };
         let runs: Vec<Option<OfRun>> = factors.iter().map(|run| run.as_ref().map(of_run)).collect();
-        let all = filled(&runs)?;
-        (
-            Pattern::ByRun(all.iter().map(|run| run.values.clone()).collect()),
-            all.into_iter().flat_map(|run| run.errors).collect(),
-        )
+        let (values, errors) = filled(&runs)?;
+        (Pattern::ByRun(values), errors)
     } else {
         (Pattern::Constant(vec![start]), vec![error])
     };

@@ -237,13 +237,13 @@ fn by_runs(
         let values = numbers(&part.settings[0]);
         told[run] = (errors.iter().all(|error| error.is_finite())).then_some(OfRun { values, errors });
     }
-    let all = filled(&told)?;
+    let (values, errors) = filled(&told)?;
     Some(Refined {
         settings: vec![Setting {
             spec: variant.spec,
-            pattern: Pattern::ByRun(all.iter().map(|run| run.values.clone()).collect()),
+            pattern: Pattern::ByRun(values),
         }],
-        standard_errors: vec![all.into_iter().flat_map(|run| run.errors).collect()],
+        standard_errors: vec![errors],
         gain: parts.iter().map(|part| part.log_likelihood).sum::<f64>() - base.iter().sum::<f64>(),
         fitted: parts.iter().map(|part| part.knobs.len()).sum(),
         by: By::Run,
