@@ -26,6 +26,14 @@ pub(super) struct Base {
 }
 
 impl Base {
+    /// The same in units of another scatter, if there is one.
+    pub(super) fn in_units_of(self, scatter: Option<Vec<Scatter>>) -> Self {
+        Self {
+            scatter: scatter.or(self.scatter),
+            ..self
+        }
+    }
+
     /// What no change of its numbers explains.
     fn beyond(&self, left: White) -> White {
         without_directions(left, &self.following)

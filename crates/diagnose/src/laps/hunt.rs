@@ -9,6 +9,7 @@ use super::atlas::{Atlas, Simulate, White};
 use super::beside::Base;
 use super::expectation::Expectation;
 use super::hypothesis::{Hypothesis, Part};
+use super::simulated::FINAL_SETS;
 
 /// Data sets simulated at each size, at one spacing after the other.
 const CLOSER: [u64; 4] = [3, 4, 8, 8];
@@ -130,8 +131,9 @@ impl Atlas {
         self.hunt_each(simulate, data, hypothesis, &CLOSER[..1], wider)
     }
 
-    /// A hypothesis whose sizes that jump are those of a parabola over a wider neighbourhood, with errors of it: how rounding
-    /// falls on a reading or a speed makes likelihoods rough at a small scale, where one bottom is as good as the next.
+    /// A hypothesis whose sizes that jump are those of a parabola over a wider neighbourhood, with errors of it, in units of its own
+    /// scatter: how rounding falls on a reading or a speed makes likelihoods rough at a small scale, where one bottom is as good as
+    /// the next.
     pub(super) fn smoothed(
         &self,
         simulate: &Simulate<'_>,
@@ -139,10 +141,16 @@ impl Atlas {
         hypothesis: &Hypothesis,
     ) -> Hypothesis {
         let mut smooth = hypothesis.clone();
+        if hypothesis.parts.iter().all(|part| part.held.is_none()) {
+            return smooth;
+        }
+        let own = (self.evaluate(simulate, hypothesis, self.enough(FINAL_SETS, 1)))
+            .and_then(|evaluated| self.scatter_of(evaluated.summaries.iter(), 1));
         for i in 0..smooth.parts.len() {
-            let Some(hunt) = self.hunt_of(&smooth, i) else {
+            let Some(mut hunt) = self.hunt_of(&smooth, i) else {
                 continue;
             };
+            hunt.base = hunt.base.in_units_of(own.clone());
             let distances = |sizes: &[f64]| {
                 const SETS: u64 = 6;
                 self.distances(simulate, data, &hunt, sizes, SETS)
@@ -268,20 +276,19 @@ fn least(found: &[(f64, f64)]) -> Option<(f64, f64)> {
 }
 
 /// The least of a parabola through squared distances at ever wider spaced sizes, and its standard error, once they rise enough
-/// to either side; `None` if they do so at once, or never.
+/// to either side for a parabola to tell; `None` if they never do.
 fn smooth_size(distances: impl Fn(&[f64]) -> Vec<(f64, f64)>, size: f64, error: f64) -> Option<(f64, f64)> {
     /// Squared distance by which both ends must rise: five standard errors.
     const RISE: f64 = 25.0;
+    /// Share of what the sizes span to either side that the error may be.
+    const TELLS: f64 = 0.5;
     /// Times by which the sizes lie wider apart from one look to the next, and looks at most.
     const WIDER: f64 = 4.0;
     const LOOKS: i32 = 6;
-    /// Share of a size over which the first look reaches at least.
-    const NARROW: f64 = 1e-3;
     /// Standard errors that fit into half a flat bottom.
     const FLAT: f64 = 3.0;
-    let first = (2.0 * error).max(NARROW * size);
     for look in 0..LOOKS {
-        let reach = first * WIDER.powi(look);
+        let reach = 2.0 * error * WIDER.powi(look);
         if reach >= size {
             break;
         }
@@ -290,9 +297,12 @@ fn smooth_size(distances: impl Fn(&[f64]) -> Vec<(f64, f64)>, size: f64, error: 
         let (lowest, _) = least(&found)?;
         let rises = |end: Option<&(f64, f64)>| end.is_some_and(|end| end.0 - lowest > RISE);
         if found.len() == sizes.len() && rises(found.first()) && rises(found.last()) {
-            let (size, error) = vertex(&found, size, reach).filter(|_| look > 0)?;
-            // Distances that hardly rose at the spacing before may have a flat bottom as wide.
-            return Some((size, error.max(reach / WIDER / FLAT)));
+            let told = vertex(&found, size, reach).filter(|(_, error)| *error < TELLS * reach);
+            if let Some((size, error)) = told {
+                // Distances that hardly rose at the spacing before may have a flat bottom as wide.
+                let flat = if look > 0 { reach / WIDER / FLAT } else { 0.0 };
+                return Some((size, error.max(flat)));
+            }
         }
     }
     None
@@ -335,13 +345,23 @@ mod tests {
     }
 
     #[test]
-    fn a_sharp_size_is_left_alone() {
+    fn a_sharp_size_is_where_its_parabola_is_least() {
         let sharp = |sizes: &[f64]| {
+            let at = |size: f64| ((size - 30.0004) / 1e-3).powi(2);
+            sizes.iter().map(|&size| (at(size), size)).collect()
+        };
+        let (size, error) = smooth_size(sharp, 30.0, 3e-3).unwrap();
+        assert!((size - 30.0004).abs() < 1e-9 && (error - 1e-3).abs() < 1e-9);
+    }
+
+    #[test]
+    fn what_hardly_rises_is_left_alone() {
+        let flat = |sizes: &[f64]| {
             sizes
                 .iter()
-                .map(|&size| (((size - 30.0) / 1e-3).powi(2), size))
+                .map(|&size| ((0.1 * (size - 30.0)).powi(2), size))
                 .collect()
         };
-        assert_eq!(smooth_size(sharp, 30.0, 3e-3), None);
+        assert_eq!(smooth_size(flat, 30.0, 3e-3), None);
     }
 }
