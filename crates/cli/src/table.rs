@@ -148,6 +148,26 @@ pub(crate) fn with_error(value: f64, error: f64) -> String {
     format!("{value:.decimals$} ± {error:.decimals$}")
 }
 
+/// A number with the ends of its interval, as far as it has any.
+pub(crate) fn with_interval(value: f64, [low, high]: [Option<f64>; 2]) -> String {
+    if value != 0.0 && value.abs() < SMALL {
+        let power = power_of_ten(value.abs());
+        let up = |x: f64| 10.0_f64.powi(-power) * x;
+        let number = with_interval(up(value), [low.map(up), high.map(up)]);
+        return format!("({number})e{power}");
+    }
+    let reach = |end: Option<f64>| end.map_or(f64::INFINITY, |end| (value - end).abs());
+    let decimals = decimals(reach(low).min(reach(high)).min(value.abs()));
+    let number = |x: f64| format!("{x:.decimals$}");
+    let interval = match (low.map(number), high.map(number)) {
+        (Some(low), Some(high)) => format!("{low} to {high}"),
+        (Some(low), None) => format!("{low} or more"),
+        (None, Some(high)) => format!("{high} or less"),
+        (None, None) => "of any size".into(),
+    };
+    format!("{}, {interval}", number(value))
+}
+
 /// A number by whose distance from a neutral one it matters: of the distance it shows two significant digits.
 pub(crate) fn far_from(neutral: f64, x: f64) -> String {
     let distance = (x - neutral).abs();
@@ -185,6 +205,15 @@ mod tests {
         assert_eq!(with_error(37.66, 1.249), "37.7 ± 1.2");
         assert_eq!(with_error(1234.5, 0.0996), "1234.50 ± 0.10");
         assert_eq!(with_error(1234.5, 123.0), "1234 ± 123");
+        assert_eq!(with_interval(14.73, [Some(11.08), None]), "14.7, 11.1 or more");
+        assert_eq!(
+            with_interval(-1.5e-4, [None, Some(-1.2e-4)]),
+            "(-1.50, -1.20 or less)e-4"
+        );
+        assert_eq!(
+            with_interval(31.2, [Some(30.0), Some(71.0)]),
+            "31.2, 30.0 to 71.0"
+        );
         assert_eq!(four_digits(0.063_514_8), "0.06351");
         assert_eq!(four_digits(-2.0), "-2");
         assert_eq!(four_digits(0.000_012_34), "1.234e-5");

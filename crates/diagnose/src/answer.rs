@@ -257,6 +257,7 @@ mod tests {
         let effect = |name: &str, value: f64| Candidate {
             setting: Setting::constant(find(name).unwrap(), [value]),
             standard_errors: vec![0.01],
+            intervals: std::collections::BTreeMap::new(),
             gain: 100.0,
             fitted: 1,
         };

@@ -1,5 +1,6 @@
 //! What might explain a residual.
 
+use std::collections::BTreeMap;
 use std::ops::Range;
 
 use sim::{Param, Pattern, Setting, Stage, UNLISTED};
@@ -14,6 +15,9 @@ pub struct Candidate {
     /// Standard error of each fitted value, in the order of the pattern's values (for a pattern by run, run after run;
     /// by time, start values and then slopes); 0 for a value that was chosen and not fitted, such as a wall.
     pub standard_errors: Vec<f64>,
+    /// 95 % intervals of values of which the standard error tells little, because the likelihood falls far more slowly to one side,
+    /// by their place in the same order.
+    pub intervals: BTreeMap<usize, [f64; 2]>,
     /// Log-likelihood gained over the declared model.
     pub gain: f64,
     /// Number of fitted values.
@@ -21,6 +25,16 @@ pub struct Candidate {
 }
 
 impl Candidate {
+    /// The 95 % interval of a fitted value by its place in the order of the pattern's values; the value itself, twice, if it was
+    /// chosen.
+    pub fn interval(&self, place: usize) -> [f64; 2] {
+        /// Half width in standard errors.
+        const HALF_WIDTH: f64 = 1.96;
+        let reach = HALF_WIDTH * self.standard_errors[place];
+        let value = self.setting.pattern.numbers()[place];
+        (self.intervals.get(&place).copied()).unwrap_or([value - reach, value + reach])
+    }
+
     /// The stage of the loop in which it acts.
     pub fn stage(&self) -> Stage {
         stage_of(&self.setting)

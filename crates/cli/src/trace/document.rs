@@ -10,9 +10,6 @@ use super::Trace;
 use super::answer::{FromLogs, rivals};
 use super::next::Experiment;
 
-/// Half width of a 95 % interval in standard errors.
-const HALF_WIDTH_95: f64 = 1.96;
-
 /// The document of a trace.
 pub(crate) fn document(trace: &Trace) -> Value {
     let answer = &trace.answer;
@@ -201,52 +198,33 @@ fn by(effect: &Candidate) -> Value {
 /// The parameters with their intervals.
 pub(crate) fn parameters(effect: &Candidate) -> Vec<Value> {
     let params = effect.setting.spec.params;
-    let errors = &effect.standard_errors;
-    let entry = |param: &sim::Param, name: String, values: Value, low: Value, high: Value| {
-        let mut entry =
-            json!({ "name": name, "value": values, "unit": param.unit, "low": low, "high": high });
-        if let (Some(choice), None) = (
-            entry["value"]
-                .as_f64()
-                .and_then(|v| param.choices.get(v as usize)),
-            param.neutral,
-        ) {
-            entry["value"] = json!(choice);
-        }
-        entry
+    let entry = |param: &sim::Param, name: String, value: Value, low: Value, high: Value| {
+        let choice = value.as_f64().and_then(|v| param.choices.get(v as usize));
+        let value = match (choice, param.neutral) {
+            (Some(choice), None) => json!(choice),
+            _ => value,
+        };
+        json!({ "name": name, "value": value, "unit": param.unit, "low": low, "high": high })
     };
-    let bounds = |value: f64, error: f64| (value - HALF_WIDTH_95 * error, value + HALF_WIDTH_95 * error);
+    let one = |param: &sim::Param, name: String, value: f64, place: usize| {
+        let [low, high] = effect.interval(place);
+        entry(param, name, json!(value), json!(low), json!(high))
+    };
+    let each = params.iter().enumerate();
     match &effect.setting.pattern {
-        Pattern::Constant(values) => (params.iter().enumerate())
-            .map(|(i, p)| {
-                let (low, high) = bounds(values[i], errors[i]);
-                entry(p, p.name.into(), json!(values[i]), json!(low), json!(high))
+        Pattern::Constant(values) => each.map(|(i, p)| one(p, p.name.into(), values[i], i)).collect(),
+        Pattern::ByTime { start, per_s } => each
+            .flat_map(|(i, p)| {
+                let change = || one(p, format!("{}_per_s", p.name), per_s[i], params.len() + i);
+                let changes = (per_s[i] != 0.0).then(change);
+                std::iter::once(one(p, p.name.into(), start[i], i)).chain(changes)
             })
             .collect(),
-        Pattern::ByTime { start, per_s } => {
-            let mut all = Vec::new();
-            for (i, p) in params.iter().enumerate() {
-                let (low, high) = bounds(start[i], errors[i]);
-                all.push(entry(p, p.name.into(), json!(start[i]), json!(low), json!(high)));
-                if per_s[i] != 0.0 {
-                    let (low, high) = bounds(per_s[i], errors[params.len() + i]);
-                    all.push(entry(
-                        p,
-                        format!("{}_per_s", p.name),
-                        json!(per_s[i]),
-                        json!(low),
-                        json!(high),
-                    ));
-                }
-            }
-            all
-        }
-        Pattern::ByRun(runs) => (params.iter().enumerate())
+        Pattern::ByRun(runs) => each
             .map(|(i, p)| {
-                let values: Vec<f64> = runs.iter().map(|v| v[i]).collect();
-                let bound = |r: usize| bounds(runs[r][i], errors[r * params.len() + i]);
-                let low: Vec<f64> = (0..runs.len()).map(|r| bound(r).0).collect();
-                let high: Vec<f64> = (0..runs.len()).map(|r| bound(r).1).collect();
+                let values: Vec<f64> = runs.iter().map(|values| values[i]).collect();
+                let ends = (0..runs.len()).map(|run| effect.interval(run * params.len() + i));
+                let (low, high): (Vec<f64>, Vec<f64>) = ends.map(|[low, high]| (low, high)).unzip();
                 entry(p, p.name.into(), json!(values), json!(low), json!(high))
             })
             .collect(),

@@ -12,7 +12,7 @@ use super::{MeanLaps, Trace, mean, pictures};
 use crate::experiments::{Block, Picture, Section};
 use crate::figures::MM;
 use crate::laps::SampledRun;
-use crate::table::{Table, four_digits, probability, with_error};
+use crate::table::{Table, four_digits, probability, with_error, with_interval};
 
 /// The sections of a trace.
 ///
@@ -164,42 +164,42 @@ fn describe(effect: &Candidate) -> String {
     }
 }
 
-/// The size of an effect, with its standard error where it was fitted.
+/// The size of an effect, with its standard error where it was fitted, or with its interval where that says more.
 fn size(effect: &Candidate) -> String {
     let params = effect.setting.spec.params;
-    let number = |value: f64, error: f64| {
-        if error > 0.0 {
-            with_error(value, error)
-        } else {
-            four_digits(value)
+    let numbers = effect.setting.pattern.numbers();
+    let number = |place: usize, param: &sim::Param| {
+        let (value, error) = (numbers[place], effect.standard_errors[place]);
+        match effect.intervals.get(&place) {
+            // An end of the parameter's range is none of the interval's.
+            Some(&[low, high]) => with_interval(
+                value,
+                [
+                    (low > param.low).then_some(low),
+                    (high < param.high).then_some(high),
+                ],
+            ),
+            None if error > 0.0 => with_error(value, error),
+            None => four_digits(value),
         }
     };
-    let list = |values: &[f64], errors: &[f64]| {
-        let one = |(i, p): (usize, &sim::Param)| match p.choices.get(values[i] as usize) {
+    let list = |first: usize| {
+        let one = |(i, p): (usize, &sim::Param)| match p.choices.get(numbers[first + i] as usize) {
             Some(choice) => format!("{} {choice}", p.name),
-            None => format!("{} {}", p.name, number(values[i], errors[i])),
+            None => format!("{} {}", p.name, number(first + i, p)),
         };
         params.iter().enumerate().map(one).collect::<Vec<_>>().join(", ")
     };
-    let errors = &effect.standard_errors;
     match &effect.setting.pattern {
-        Pattern::Constant(values) => list(values, errors),
-        Pattern::ByTime { start, per_s } => {
-            let changing = params.iter().zip(per_s).zip(&errors[params.len()..]);
+        Pattern::Constant(_) => list(0),
+        Pattern::ByTime { per_s, .. } => {
+            let changing = (params.iter().enumerate()).filter(|(i, _)| per_s[*i] != 0.0);
             let changes = changing
-                .filter(|((_, slope), _)| **slope != 0.0)
-                .map(|((p, slope), error)| {
-                    format!("; {} changes by {} per s", p.name, number(*slope, *error))
-                });
-            format!(
-                "{} at the start{}",
-                list(start, errors),
-                changes.collect::<String>()
-            )
+                .map(|(i, p)| format!("; {} changes by {} per s", p.name, number(params.len() + i, p)));
+            format!("{} at the start{}", list(0), changes.collect::<String>())
         }
         Pattern::ByRun(runs) => {
-            let each = runs.iter().zip(errors.chunks(params.len()));
-            let each: Vec<String> = each.map(|(values, errors)| list(values, errors)).collect();
+            let each: Vec<String> = (0..runs.len()).map(|run| list(run * params.len())).collect();
             each.join("; ")
         }
     }

@@ -152,7 +152,8 @@ impl Atlas {
             watch(&format!("the size of {}", answer.explanation.label()));
             let look = self.look_closely(simulate, &data, &answer.hypothesis, &answer.errors);
             let explanation = &mut answer.explanation;
-            explanation.effects = candidates(self, &look.found, &look.errors, explanation.gain);
+            explanation.effects =
+                candidates(self, &look.found, &look.errors, &look.intervals, explanation.gain);
             left_out = if runs.len() > 1 {
                 self.leave_out(simulate, runs, &look)?
             } else {

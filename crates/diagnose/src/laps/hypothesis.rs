@@ -1,12 +1,16 @@
 //! One or more effects with sizes and patterns, as a vector of numbers that can be fitted.
 
+use std::collections::BTreeMap;
+use std::ops::Range;
+
 use sim::{Pattern, Setting};
 
 use super::atlas::Atlas;
+use super::intervals::Interval;
 use super::probe::Probe;
 use super::screen::{at, worth};
 use super::tests_of_fit::Quadratic;
-use crate::candidate::{apart, take_mean_of_others, within};
+use crate::candidate::{apart, round, take_mean_of_others, within};
 
 /// How an effect goes over the runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -277,6 +281,13 @@ impl Part {
         all
     }
 
+    /// Intervals of its values that were found, by their place among the pattern's values.
+    pub(super) fn intervals(&self, part: usize, intervals: &[Interval]) -> BTreeMap<usize, [f64; 2]> {
+        let own = intervals.iter().filter(|(freedom, _)| freedom.part == part);
+        own.filter_map(|(freedom, ends)| Some((freedom.parameter?, *ends)))
+            .collect()
+    }
+
     fn freedoms(&self, part: usize, atlas: &Atlas) -> Vec<Freedom> {
         let probe = &atlas.probes[self.probe];
         let runs = self.values.len();
@@ -542,17 +553,13 @@ impl Hypothesis {
     pub(super) fn shares_left(&self, errors: &[(Freedom, f64)], atlas: &Atlas) -> Vec<f64> {
         let moved = errors.iter().filter_map(|(freedom, error)| {
             let part = &self.parts[freedom.part];
-            let probe = &atlas.probes[part.probe];
-            let number = probe
-                .free
-                .iter()
-                .position(|free| Some(free.0) == freedom.parameter)?;
+            let range = self.far(freedom, atlas)?;
             let error = match freedom.run {
                 Some(0) => error / (part.values.len() as f64).sqrt(),
                 Some(_) => return None,
                 None => *error,
             };
-            Some(share_left(error, freedom.quantum, probe.range_of(number)))
+            Some(share_left(error, freedom.quantum, range))
         });
         let held = self.parts.iter().filter_map(|part| {
             let range = atlas.probes[part.probe].range_of(0);
@@ -584,6 +591,21 @@ impl Hypothesis {
         freedom
             .parameter
             .map_or(part.per_s, |i| part.values[freedom.run.unwrap_or(0)][i])
+    }
+
+    /// The range of one number that all runs share; `None` of others, of those that go round, and of those that come in steps.
+    pub(super) fn range(&self, freedom: &Freedom, atlas: &Atlas) -> Option<Range<f64>> {
+        let params = atlas.probes[self.parts[freedom.part].probe].spec.params;
+        let param = params.get(freedom.parameter?)?;
+        let own = freedom.run.is_none() && freedom.quantum.is_none() && round(param).is_none();
+        own.then_some(param.low..param.high)
+    }
+
+    /// How far one number goes among robots of this kind; see [`Probe::range_of`].
+    pub(super) fn far(&self, freedom: &Freedom, atlas: &Atlas) -> Option<f64> {
+        let probe = &atlas.probes[self.parts[freedom.part].probe];
+        let is_it = |free: &(usize, f64)| Some(free.0) == freedom.parameter;
+        Some(probe.range_of(probe.free.iter().position(is_it)?))
     }
 
     /// How far one number is from what it is in another hypothesis of the same parts.

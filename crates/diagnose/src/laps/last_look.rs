@@ -5,6 +5,7 @@ use sim::Setting;
 use super::atlas::{Atlas, Simulate};
 use super::expectation::Expectation;
 use super::hypothesis::{Freedom, Hypothesis};
+use super::intervals::Interval;
 use super::observed::ObservedLap;
 use super::parabola::{Column, Local, Nearest};
 use super::refine::are_within_steps;
@@ -15,6 +16,8 @@ pub(super) struct LastLook {
     pub(super) found: Hypothesis,
     /// Standard errors of the fitted numbers, the simulation's own error included.
     pub(super) errors: Vec<(Freedom, f64)>,
+    /// 95 % intervals of numbers of which the standard error tells little.
+    pub(super) intervals: Vec<Interval>,
     /// What was looked about, in which numbers, and what was seen; `None` where nothing is fitted or the robot crashes.
     about: Hypothesis,
     freedoms: Vec<Freedom>,
@@ -43,6 +46,7 @@ impl Atlas {
         let mut look = LastLook {
             found: hypothesis.clone(),
             errors: errors.to_vec(),
+            intervals: Vec::new(),
             about: hypothesis.clone(),
             freedoms: Vec::new(),
             local: None,
@@ -75,6 +79,7 @@ impl Atlas {
             let holds = certain && are_within_steps(&moves, &freedoms);
             look = LastLook {
                 errors: freedoms.iter().copied().zip(errors).collect(),
+                intervals: Vec::new(),
                 about: look.found,
                 found,
                 freedoms,
@@ -83,6 +88,9 @@ impl Atlas {
             if holds {
                 break;
             }
+        }
+        if let Some(local) = &look.local {
+            look.intervals = self.slow_intervals(simulate, data, &look.found, &look.errors, local);
         }
         look
     }

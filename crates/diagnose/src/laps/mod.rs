@@ -10,6 +10,7 @@ mod expectation;
 mod groups;
 mod hunt;
 mod hypothesis;
+mod intervals;
 mod last_look;
 mod layout;
 mod likeliest;

@@ -13,6 +13,7 @@ use super::diagnosis::is_noise;
 use super::expectation::Expectation;
 use super::hunt::Moved;
 use super::hypothesis::{Freedom, Hypothesis, Part, Shape};
+use super::intervals::Interval;
 use super::observed::ObservedLap;
 use super::pairs::ScreenedPair;
 use super::refine::{CLOSE_SETS, Descent, Round, Settled};
@@ -616,7 +617,7 @@ impl Search<'_> {
             hypothesis: refined.hypothesis.clone(),
             errors: refined.errors.clone(),
             explanation: Explanation {
-                effects: candidates(atlas, &refined.hypothesis, &refined.errors, refined.fit.gain),
+                effects: candidates(atlas, &refined.hypothesis, &refined.errors, &[], refined.fit.gain),
                 score: refined.score,
                 gain: refined.fit.gain,
                 share: 1.0 - self.excess(&refined.fit.residual) / self.excess(self.residual),
@@ -627,11 +628,13 @@ impl Search<'_> {
     }
 }
 
-/// The effects of a hypothesis with the errors of its numbers, that of the largest action first.
+/// The effects of a hypothesis with the errors of its numbers and the intervals of those of which errors tell little, that of the
+/// largest action first.
 pub(super) fn candidates(
     atlas: &Atlas,
     hypothesis: &Hypothesis,
     errors: &[(Freedom, f64)],
+    intervals: &[Interval],
     gain: f64,
 ) -> Vec<Candidate> {
     let settings = hypothesis.settings(atlas);
@@ -642,6 +645,7 @@ pub(super) fn candidates(
                 gain,
                 fitted: hypothesis.parts[part].fitted(part, errors),
                 standard_errors: hypothesis.parts[part].errors(part, errors, atlas),
+                intervals: hypothesis.parts[part].intervals(part, intervals),
             };
             (hypothesis.weight(part, atlas), candidate)
         })

@@ -373,6 +373,7 @@ fn candidate(
     Some(Candidate {
         setting: Setting { spec, pattern },
         standard_errors,
+        intervals: BTreeMap::new(),
         gain: f64::INFINITY,
         fitted,
     })

@@ -1,5 +1,7 @@
 //! From logs to an answer.
 
+use std::collections::BTreeMap;
+
 use sim::{Model, Pattern, Scene, Setting, Stage, find};
 
 use super::channels::Channel;
@@ -188,6 +190,7 @@ impl Search<'_> {
             Some(Candidate {
                 setting: Setting::constant(spec, [counts]),
                 standard_errors: vec![2e-4 * counts],
+                intervals: BTreeMap::new(),
                 gain: self.rounding_gain,
                 fitted: 1,
             })
@@ -201,6 +204,7 @@ impl Search<'_> {
             .map(|(setting, errors)| Candidate {
                 setting: setting.clone(),
                 standard_errors: errors.clone(),
+                intervals: BTreeMap::new(),
                 gain: refined.gain,
                 fitted: errors.iter().filter(|error| **error > 0.0).count(),
             });

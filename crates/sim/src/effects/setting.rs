@@ -21,6 +21,17 @@ pub enum Pattern {
     },
 }
 
+impl Pattern {
+    /// Its numbers in a row: run after run, or values at the start and then their changes per second.
+    pub fn numbers(&self) -> Vec<f64> {
+        match self {
+            Self::Constant(values) => values.clone(),
+            Self::ByRun(runs) => runs.concat(),
+            Self::ByTime { start, per_s } => [start.as_slice(), per_s].concat(),
+        }
+    }
+}
+
 /// An effect with its values.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Setting {
