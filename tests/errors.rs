@@ -217,6 +217,18 @@ fn models_with_keys_or_values_that_are_not_there() {
             "model.toml:3: effect.0.gain = inf is not a finite number",
         ),
         (
+            "[[effect]]\nkind = \"one-sensor-gain\"\nsensor = 2\n",
+            "model.toml:2: effect.0.kind: one-sensor-gain without `gain` does nothing",
+        ),
+        (
+            "[[effect]]\nkind = \"reading-gain\"\nby = \"run\"\ngain = [1.1]\n",
+            "model.toml:3: effect.0.by: reading-gain has values for 1 runs by run, and there is a run 2",
+        ),
+        (
+            "[sensor]\nrays = 100000000\n",
+            "model.toml:2: sensor.rays = 100000000 is outside [1, 10000]",
+        ),
+        (
             "world = \"elsewhere\"\n",
             "model.toml:1: unknown world `elsewhere`: there is no file elsewhere; shipped worlds: roduit2007",
         ),
@@ -283,6 +295,7 @@ fn runs_that_cannot_be_read() {
     for (run, message) in [
         ("t_s,x_m\n0,1\n", "run_a.csv:1: column y_m is missing; there are: t_s, x_m".to_owned()),
         ("t_s;x_m;y_m\n0;1;1\n", "run_a.csv:1: `t_s;x_m;y_m` is one column; separate columns by commas".to_owned()),
+        ("t\0_\0s\0", "run_a.csv:1: the text is UTF-16, or no text at all; save it as UTF-8".to_owned()),
         ("t_s,x_m,y_m\n0,1,2\n0.064,1\n", format!("run_a.csv:3: 2 fields under a header of 3; {rectangle}")),
         ("t_s,x_m,y_m\n0,1,abc\n", format!("run_a.csv:2: y_m: `abc` {FINITE}; {missing}")),
         ("t_s,x_m,y_m\n0,nan,1\n", format!("run_a.csv:2: x_m: `nan` {FINITE}; {missing}")),

@@ -61,13 +61,14 @@ impl OutDir {
         let (partial, replaced) = (beside(dir, ".partial")?, beside(dir, ".replaced")?);
         recover(dir, &replaced)?;
         refuse_foreign(dir)?;
-        let there = partial.symlink_metadata().is_ok();
+        // An empty one is what a run left that was killed as it cleared up.
+        let there = partial.symlink_metadata().is_ok() && fs::remove_dir(&partial).is_err();
         let lock = there.then(|| lock_ours(&partial)).transpose()?;
         let resumed = there && resume;
         if resumed {
             refuse_other_work(&partial, work)?;
         } else if there {
-            fs::remove_dir_all(&partial).with_context(|| format!("cannot remove {}", partial.display()))?;
+            remove_ours(&partial).with_context(|| format!("cannot remove {}", partial.display()))?;
         }
         let marker = match lock {
             Some(lock) if resumed => lock,
@@ -183,9 +184,25 @@ impl Drop for OutDir {
     fn drop(&mut self) {
         if !self.keep {
             // Nobody is left to be told; a next run removes what this one could not.
-            let _ = fs::remove_dir_all(&self.partial);
+            let _ = remove_ours(&self.partial);
         }
     }
+}
+
+/// Removes a folder with its marker last: if that is cut short, it still shows to be ours.
+fn remove_ours(partial: &Path) -> std::io::Result<()> {
+    for entry in fs::read_dir(partial)? {
+        let entry = entry?;
+        if entry.file_name() == MARKER {
+            continue;
+        }
+        if entry.file_type()?.is_dir() {
+            fs::remove_dir_all(entry.path())?;
+        } else {
+            fs::remove_file(entry.path())?;
+        }
+    }
+    fs::remove_dir_all(partial)
 }
 
 fn beside(dir: &Path, ending: &str) -> Result<PathBuf> {

@@ -239,6 +239,9 @@ pub struct Beam {
 }
 
 impl Beam {
+    /// Rays of a sensor at most: a hundred times as many as make a cone smooth.
+    pub const MOST_RAYS: usize = 10_000;
+
     /// One ray along the axis.
     pub fn single() -> Self {
         Self {
@@ -252,16 +255,9 @@ impl Beam {
     /// edge. One ray, or no angle, is [`Beam::single`].
     ///
     /// # Errors
-    /// A count of 0, or an angle outside [0, pi/2].
+    /// A count outside [1, [`Self::MOST_RAYS`]], or an angle outside [0, pi/2].
     pub fn cone(count: usize, half_angle_rad: f64, combine: Combine) -> Result<Self, Error> {
-        if count == 0 {
-            return Err(Error::OutOfRange {
-                key: "sensor.rays".into(),
-                value: 0.0,
-                low: 1.0,
-                high: f64::INFINITY,
-            });
-        }
+        check("sensor.rays", count as f64, 1.0, Self::MOST_RAYS as f64)?;
         check(
             "sensor.half_angle_rad",
             half_angle_rad,

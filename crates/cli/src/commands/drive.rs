@@ -14,7 +14,7 @@ use crate::interrupt;
 use crate::laps::{self, SampledRun, mean_and_deviation};
 use crate::output::{OutDir, Work, sha256};
 use crate::session::Session;
-use crate::setup::{self, Setup};
+use crate::setup::{self, Setup, locate};
 use crate::table::Table;
 
 pub(crate) fn run(session: &Session, args: &args::Drive) -> Result<()> {
@@ -28,12 +28,14 @@ pub(crate) fn run(session: &Session, args: &args::Drive) -> Result<()> {
     });
     let out = OutDir::create(&args.out, &Work::new("drive", &configuration), false)?;
     let (runs, laps) = (args.runs as usize, args.laps as usize);
+    let source = file.world(world)?;
     let progress = session.progress("driving", u64::from(args.runs));
     let driven: Vec<(Drive, Rows)> = (0..runs)
         .into_par_iter()
         .map(|run| {
             interrupt::check()?;
-            let driven = record(&setup, session.seed(), run, laps, args.log)?;
+            let driven = record(&setup, session.seed(), run, laps, args.log);
+            let driven = driven.map_err(|error| locate(&file, &source, error))?;
             progress.tick(1);
             anyhow::Ok(driven)
         })
@@ -49,7 +51,6 @@ pub(crate) fn run(session: &Session, args: &args::Drive) -> Result<()> {
         .enumerate()
         .map(|(i, (drive, _))| laps::simulated(&name, i, drive, laps))
         .collect();
-    let source = file.world(world)?;
     let shipped = source.path.is_none();
     let rows: Vec<(String, Rows)> = driven
         .iter()
@@ -109,7 +110,7 @@ fn caster(name: &str) -> Option<CasterKind> {
 }
 
 /// Drives one run and keeps its rows.
-fn record(setup: &Setup, seed: u64, run: usize, laps: usize, log: bool) -> Result<(Drive, Rows)> {
+fn record(setup: &Setup, seed: u64, run: usize, laps: usize, log: bool) -> Result<(Drive, Rows), sim::Error> {
     let mut rows = Rows {
         log: log.then(Log::default),
         ..Rows::default()

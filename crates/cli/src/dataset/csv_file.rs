@@ -187,6 +187,9 @@ fn unpacked(bytes: &[u8]) -> std::io::Result<Vec<u8>> {
 }
 
 fn header(row: &ByteRecord) -> Result<Vec<String>> {
+    if row.as_slice().contains(&0) {
+        bail!("the text is UTF-16, or no text at all; save it as UTF-8");
+    }
     let names: Vec<String> = row
         .iter()
         .map(|name| String::from_utf8_lossy(name).trim().to_owned())

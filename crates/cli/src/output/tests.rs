@@ -101,10 +101,22 @@ fn anything_else_is_refused_and_left_alone() {
 }
 
 #[test]
+fn an_empty_partial_folder_is_what_a_killed_run_left() {
+    let home = TempDir::new().unwrap();
+    let dir = home.path().join("out");
+    fs::create_dir(home.path().join("out.partial")).unwrap();
+    let out = OutDir::create(&dir, &work(0.1), false).unwrap();
+    out.write("deep/a.txt", "a").unwrap();
+    drop(out);
+    assert!(names(home.path()).is_empty());
+}
+
+#[test]
 fn a_foreign_partial_folder_is_refused() {
     let home = TempDir::new().unwrap();
     let dir = home.path().join("out");
     fs::create_dir(home.path().join("out.partial")).unwrap();
+    fs::write(home.path().join("out.partial/mine.txt"), "mine").unwrap();
     for resume in [false, true] {
         let error = refusal(&dir, resume);
         assert!(error.ends_with("out.partial is there and was not made by lapwing; move it away"));

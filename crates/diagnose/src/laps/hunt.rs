@@ -24,6 +24,8 @@ pub(super) struct Hunt {
     spacing: f64,
     /// How often sizes closer to it were looked at.
     looks: usize,
+    /// The squared distance of the data that it leaves, as the last look saw it; infinite before the first.
+    pub(super) left: f64,
 }
 
 /// How far the effects beside one that jumps have moved since its size was found: it may be off by some per cent, or by a tenth of
@@ -42,7 +44,19 @@ impl Hunt {
             size,
             spacing,
             looks: 0,
+            left: f64::INFINITY,
         }
+    }
+
+    /// The same where a scan saw what it leaves.
+    pub(super) fn leaving(self, left: f64) -> Self {
+        Self { left, ..self }
+    }
+
+    /// Hunts, what leaves least first.
+    pub(super) fn least_first(mut hunts: Vec<Self>) -> Vec<Self> {
+        hunts.sort_by(|a, b| a.left.total_cmp(&b.left));
+        hunts
     }
 }
 
@@ -88,16 +102,16 @@ impl Atlas {
         Some(hunt.base.hypothesis.with(&Hypothesis::of(part)))
     }
 
-    /// A hunt after one look closer, and the squared distance that is then left.
+    /// A hunt after one look closer.
     pub(super) fn hunted_once(
         &self,
         simulate: &Simulate<'_>,
         data: &Expectation,
         mut hunt: Hunt,
-    ) -> Option<(f64, Hunt)> {
+    ) -> Option<Hunt> {
         let sets = CLOSER[hunt.looks];
-        let found = self.look_closer(simulate, data, &mut hunt, sets)?;
-        Some((least(&found)?.0, hunt))
+        self.look_closer(simulate, data, &mut hunt, sets)?;
+        Some(hunt)
     }
 
     /// A hypothesis whose effects that jump have better sizes beside the others, whose numbers may follow but are left as they
@@ -202,7 +216,7 @@ impl Atlas {
             last = self.look_closer(simulate, data, &mut hunt, sets)?;
         }
         // Sizes that are no worse than by 4 in squared distance bound the answer.
-        let bound = least(&last)?.0 + 4.0;
+        let bound = hunt.left + 4.0;
         let as_good = last
             .iter()
             .filter(|found| found.0 < bound)
@@ -223,7 +237,7 @@ impl Atlas {
             .map(|i| hunt.size + hunt.spacing * f64::from(i) / 3.0)
             .collect();
         let found = self.distances(simulate, data, hunt, &sizes, sets);
-        hunt.size = least(&found)?.1;
+        (hunt.left, hunt.size) = least(&found)?;
         hunt.spacing /= 3.0;
         hunt.looks += 1;
         Some(found)

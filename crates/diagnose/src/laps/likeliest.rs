@@ -4,7 +4,7 @@ use super::atlas::{Atlas, Simulate};
 use super::expectation::Expectation;
 use super::hypothesis::{Freedom, Hypothesis};
 use super::likelihood::Fit;
-use super::parabola::Local;
+use super::parabola::{Local, Sides};
 use super::refine::SETTLED;
 use super::simulated::Evaluated;
 
@@ -43,10 +43,13 @@ impl Atlas {
         let [freedom] = freedoms else {
             return None;
         };
-        let [[(down, at_down), (up, at_up)]] = local.sides.as_slice() else {
+        let [Sides { down, up, .. }] = local.sides.as_slice() else {
             return None;
         };
-        let (&[down], &[up]) = (down.as_slice(), up.as_slice()) else {
+        let ((at_down, &[down]), (at_up, &[up])) = (
+            (&down.simulated, down.by.as_slice()),
+            (&up.simulated, up.by.as_slice()),
+        ) else {
             return None;
         };
         if down == 0.0 || up == 0.0 {

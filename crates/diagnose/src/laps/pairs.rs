@@ -9,7 +9,7 @@ use super::hypothesis::{Hypothesis, Part, Shape};
 use super::refine::Descent;
 use super::screen::{BEYOND, price, tangent};
 use super::search::{
-    BASES, Found, ROUNDS_BESIDE, ROUNDS_OF_SEVERAL, Rounds, STRONG, Search, best_of, of_other_effects,
+    BASES, Found, ROUNDS_BESIDE, ROUNDS_OF_SEVERAL, Rung, STRONG, Search, best_of, of_other_effects,
 };
 
 /// A straight piece of a probe's path.
@@ -198,7 +198,7 @@ impl Atlas {
 
 /// Hypotheses of several effects that were descended from, and where that led.
 struct Tried {
-    rounds: &'static Rounds,
+    rounds: &'static [Rung],
     /// A score that was reached without them.
     reached: f64,
     starts: Vec<Hypothesis>,
@@ -206,7 +206,7 @@ struct Tried {
 }
 
 impl Tried {
-    fn new(rounds: &'static Rounds, reached: f64) -> Self {
+    fn new(rounds: &'static [Rung], reached: f64) -> Self {
         Self {
             rounds,
             reached,
@@ -246,7 +246,7 @@ impl Search<'_> {
         let mut tried = Tried::new(&ROUNDS_OF_SEVERAL, f64::NEG_INFINITY);
         let mut hunts = self.promising_hunts();
         let beats_others = |left: f64| self.together().first().is_none_or(|best| left < best.left);
-        let jumps_first = hunts.first().is_some_and(|(left, _)| beats_others(*left));
+        let jumps_first = hunts.first().is_some_and(|hunt| beats_others(hunt.left));
         if jumps_first {
             self.descend_on(&mut tried, self.pairs_that_jump(&hunts));
         }
@@ -280,7 +280,7 @@ impl Search<'_> {
 
     /// Pairs with a size that jumps, if sizes were simulated all over their range and these pairs promise more than those that are
     /// looked for together: they promise rather more than they keep.
-    fn promising_hunts(&self) -> Vec<(f64, Hunt)> {
+    fn promising_hunts(&self) -> Vec<Hunt> {
         if !self.was_scanned() {
             return Vec::new();
         }

@@ -27,34 +27,38 @@ impl Atlas {
             let at = |sign: f64| {
                 let moves: Vec<(Freedom, f64)> = group.iter().map(|f| (*f, sign * f.step)).collect();
                 let moved = hypothesis.moved(self, &moves);
-                let by: Vec<f64> = group.iter().map(|f| moved.apart(hypothesis, f, self)).collect();
-                self.evaluate(simulate, &moved, sets)
-                    .map(|evaluated| (by, evaluated))
+                Some(Point {
+                    by: group.iter().map(|f| moved.apart(hypothesis, f, self)).collect(),
+                    simulated: self.evaluate(simulate, &moved, sets)?,
+                })
             };
             // Where the robot crashes on one side, the other one tells the slope.
-            let nowhere = |side: Option<(Vec<f64>, Evaluated)>| {
-                side.unwrap_or_else(|| (vec![0.0; group.len()], center.clone()))
+            let nowhere = || Point {
+                by: vec![0.0; group.len()],
+                simulated: center.clone(),
             };
             let (down, up) = (at(-1.0), at(1.0));
             if down.is_none() && up.is_none() {
                 return None;
             }
-            let (down, up) = (nowhere(down), nowhere(up));
-            sides.push((group, down, up));
+            let (down, up) = (down.unwrap_or_else(nowhere), up.unwrap_or_else(nowhere));
+            sides.push(Sides { group, down, up });
         }
-        let all = sides
-            .iter()
-            .flat_map(|(_, a, b)| a.1.summaries.iter().chain(&b.1.summaries));
+        let all = (sides.iter().flat_map(|sides| [&sides.down, &sides.up]))
+            .flat_map(|point| &point.simulated.summaries);
         let scatter = self.scatter_of(center.summaries.iter().chain(all), 1 + 2 * sides.len())?;
         let columns_of = |expected: &dyn Fn(&Evaluated) -> Expectation| -> Vec<Column> {
             let from = expected(&center);
-            let action = |e: &Evaluated| white(&scatter, &self.layout, &expected(e), &from);
             let mut columns = Vec::new();
-            for (group, (down_by, down), (up_by, up)) in &sides {
-                let (down, up) = (action(down), action(up));
+            for Sides { group, down, up } in &sides {
+                let [at_down, at_up] =
+                    [down, up].map(|point| white(&scatter, &self.layout, &expected(&point.simulated), &from));
                 for (i, freedom) in group.iter().enumerate() {
                     let own = |action: &White| freedom.own_share(action, &self.layout);
-                    columns.push(Column::through((down_by[i], own(&down)), (up_by[i], own(&up))));
+                    columns.push(Column::through(
+                        (down.by[i], own(&at_down)),
+                        (up.by[i], own(&at_up)),
+                    ));
                 }
             }
             columns
@@ -78,21 +82,21 @@ impl Atlas {
             center,
             scatter,
             columns,
-            sides: sides.into_iter().map(|(_, down, up)| [down, up]).collect(),
+            sides,
         })
     }
 
     /// What each number of a group does to the scatter of laps, as the points to either side tell it.
-    fn widenings(&self, scatter: &[Scatter], side: &Side) -> Vec<Vec<f64>> {
-        let (group, (down_by, down), (up_by, up)) = side;
-        let squares = |g: usize, evaluated: &Evaluated| {
-            scatter[g].mean_square(evaluated.summaries.iter().map(|summary| &summary.0[g]))
+    fn widenings(&self, scatter: &[Scatter], sides: &Sides) -> Vec<Vec<f64>> {
+        let Sides { group, down, up } = sides;
+        let squares = |g: usize, point: &Point| {
+            scatter[g].mean_square(point.simulated.summaries.iter().map(|summary| &summary.0[g]))
         };
         let changes: Vec<f64> = (0..scatter.len())
             .map(|g| (squares(g, up) / squares(g, down)).ln())
             .collect();
         let of_number = |(i, freedom): (usize, &Freedom)| {
-            let between = up_by[i] - down_by[i];
+            let between = up.by[i] - down.by[i];
             let widening = |(g, change): (usize, &f64)| {
                 let widening = change * freedom.share_of_scatter(g, &self.layout) / between;
                 if between == 0.0 { 0.0 } else { widening }
@@ -103,8 +107,20 @@ impl Atlas {
     }
 }
 
-/// Numbers that are moved together, and what was simulated to either side of them with the moves that lead there.
-type Side = (Vec<Freedom>, (Vec<f64>, Evaluated), (Vec<f64>, Evaluated));
+/// Numbers that are moved together, and what was simulated to either side of them.
+#[derive(Debug, Clone)]
+pub(super) struct Sides {
+    group: Vec<Freedom>,
+    pub(super) down: Point,
+    pub(super) up: Point,
+}
+
+/// What was simulated where moves lead, one of each number that is moved.
+#[derive(Debug, Clone)]
+pub(super) struct Point {
+    pub(super) by: Vec<f64>,
+    pub(super) simulated: Evaluated,
+}
 
 /// Freedoms that are moved together: the sizes of one part in its runs.
 pub(super) fn groups(freedoms: &[Freedom]) -> Vec<Vec<Freedom>> {
@@ -158,8 +174,8 @@ pub(super) struct Local {
     pub(super) center: Evaluated,
     pub(super) scatter: Vec<Scatter>,
     pub(super) columns: Vec<Column>,
-    /// What was simulated to either side of each number, or of the sizes of all runs, with the moves that lead there.
-    pub(super) sides: Vec<[(Vec<f64>, Evaluated); 2]>,
+    /// What was simulated to either side of each number, or of the sizes of all runs.
+    pub(super) sides: Vec<Sides>,
 }
 
 /// The action of one number: slope and curvature.

@@ -43,25 +43,21 @@ impl Beside {
 }
 
 impl Scan {
-    /// The best size, and the squared distance that it leaves; `None` where no size explains a fair share of what the base
-    /// leaves.
-    fn best(&self, base: &Base, chance: f64) -> Option<(f64, Hunt)> {
+    /// A hunt from the best size; `None` where no size explains a fair share of what the base leaves.
+    fn best(&self, base: &Base, chance: f64) -> Option<Hunt> {
         self.bottoms(base, chance).into_iter().next()
     }
 
-    /// The best of the sizes that leave less than their neighbours, and the squared distances that they leave; none that explain less
-    /// than a fair share of what the base leaves.
-    fn bottoms(&self, base: &Base, chance: f64) -> Vec<(f64, Hunt)> {
+    /// Hunts from the best of the sizes that leave less than their neighbours; from none that explain less than a fair share of what
+    /// the base leaves.
+    fn bottoms(&self, base: &Base, chance: f64) -> Vec<Hunt> {
         const FAIR_SHARE: f64 = 0.25;
         const MOST: usize = 3;
         let squares: Vec<f64> = self.looks.iter().map(Look::square).collect();
         let is_fair = |&i: &usize| squares[i] - chance < (1.0 - FAIR_SHARE) * self.excess;
         let hunt = |i: usize| {
             let size = self.looks[i].size;
-            (
-                squares[i],
-                Hunt::new(base.clone(), self.probe, size, self.spacing(size)),
-            )
+            Hunt::new(base.clone(), self.probe, size, self.spacing(size)).leaving(squares[i])
         };
         (bottoms(&squares).into_iter().filter(is_fair).take(MOST))
             .map(hunt)
@@ -180,12 +176,9 @@ impl Search<'_> {
                 self.atlas.probes[scan.probe].spec.name
             ));
             // Where a reading or a speed is so many steps, one more or one less does nearly the same.
-            let bottoms = scan.bottoms(&nothing, self.chance());
-            let mut closer: Vec<(f64, Hunt)> = (bottoms.into_iter())
-                .filter_map(|(_, hunt)| self.atlas.hunted_once(self.simulate, self.data, hunt))
-                .collect();
-            closer.sort_by(|a, b| a.0.total_cmp(&b.0));
-            let (_, hunt) = closer.into_iter().next()?;
+            let closer = (scan.bottoms(&nothing, self.chance()).into_iter())
+                .filter_map(|hunt| self.atlas.hunted_once(self.simulate, self.data, hunt));
+            let hunt = Hunt::least_first(closer.collect()).into_iter().next()?;
             let found = self.atlas.hunted(self.simulate, self.data, &hunt)?;
             let end = Descent::start(self.atlas, &found);
             let settled = self.atlas.settle(self.simulate, self.data, &end)?;
@@ -219,8 +212,8 @@ impl Search<'_> {
         (self.atlas).screen_beside_scans(self.residual, self.scanned(), HEARD)
     }
 
-    /// Such pairs, those that come nearest first, with the squared distance that they leave as far as the other's size follows.
-    pub(super) fn hunts_of_pairs(&self, screened: &[Beside]) -> Vec<(f64, Hunt)> {
+    /// Such pairs, those that come nearest first, as far as the other's size follows.
+    pub(super) fn hunts_of_pairs(&self, screened: &[Beside]) -> Vec<Hunt> {
         self.tell(format_args!("which sizes that jump go with another effect"));
         let look = |beside: &Beside| {
             let other = Part::screened(self.atlas, beside.other, Shape::Constant, &[beside.other_size]);
@@ -228,22 +221,20 @@ impl Search<'_> {
             let hunt = Hunt::new(base, beside.jumping, beside.size, beside.spacing);
             self.atlas.hunted_once(self.simulate, self.data, hunt)
         };
-        let mut hunts: Vec<(f64, Hunt)> = screened.par_iter().filter_map(look).collect();
-        hunts.sort_by(|a, b| a.0.total_cmp(&b.0));
-        hunts
+        Hunt::least_first(screened.par_iter().filter_map(look).collect())
     }
 
     /// The best of these pairs at the best of sizes ever closer.
-    pub(super) fn pairs_that_jump(&self, hunts: &[(f64, Hunt)]) -> Vec<Hypothesis> {
+    pub(super) fn pairs_that_jump(&self, hunts: &[Hunt]) -> Vec<Hypothesis> {
         const KEPT: usize = 3;
         /// Looks closer before the other effect's size follows.
         const LOOKS: usize = 2;
         /// Squared distance, and the share of what the best leaves, by which a pair may lie behind it.
         const BEHIND: (f64, f64) = (100.0, 0.5);
-        let least = hunts.first().map_or(0.0, |hunt| hunt.0);
+        let least = hunts.first().map_or(0.0, |hunt| hunt.left);
         let bound = least + BEHIND.0.max(BEHIND.1 * (least - self.chance()));
-        (hunts.iter().take(KEPT).filter(|hunt| hunt.0 <= bound))
-            .filter_map(|(_, hunt)| (self.atlas).hunted_for(self.simulate, self.data, hunt, LOOKS))
+        (hunts.iter().take(KEPT).filter(|hunt| hunt.left <= bound))
+            .filter_map(|hunt| (self.atlas).hunted_for(self.simulate, self.data, hunt, LOOKS))
             .collect()
     }
 
@@ -260,7 +251,7 @@ impl Search<'_> {
                 bases.push(Hypothesis::of(part.clone()));
             }
         }
-        let mut hunts: Vec<(f64, Hunt)> = Vec::new();
+        let mut hunts: Vec<Hunt> = Vec::new();
         for base in bases {
             let spec = self.atlas.probes[base.parts[0].probe].spec;
             let base = self.base(base);
@@ -274,9 +265,8 @@ impl Search<'_> {
                 hunts.extend(scan.and_then(|scan| scan.best(&base, self.chance())));
             }
         }
-        hunts.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let starts: Vec<Hypothesis> = (hunts.iter().take(CLOSER))
-            .filter_map(|(_, hunt)| self.atlas.hunted(self.simulate, self.data, hunt))
+        let starts: Vec<Hypothesis> = (Hunt::least_first(hunts).iter().take(CLOSER))
+            .filter_map(|hunt| self.atlas.hunted(self.simulate, self.data, hunt))
             .collect();
         self.settle(self.descend_several(&starts, &ROUNDS_OF_SEVERAL, near(found)))
     }

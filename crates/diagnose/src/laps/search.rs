@@ -63,44 +63,53 @@ pub(super) struct Search<'a> {
     pub(super) descended_together: OnceLock<Vec<Descent>>,
 }
 
-/// Rounds of a descent, each with the log-likelihood, and the share of the best one's, by which what lies behind then does
-/// not come back.
-pub(super) type Rounds = [(Round, f64, f64)];
+/// A rung of successive halving (Jamieson and Talwalkar 2016): a round of every descent, after which does not come back what lies
+/// behind the best by more than a log-likelihood and a share of the best one's.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Rung {
+    round: Round,
+    behind: f64,
+    share: f64,
+}
+
+const fn rung(round: Round, behind: f64, share: f64) -> Rung {
+    Rung { round, behind, share }
+}
 
 /// Those of single effects.
-const ROUNDS: [(Round, f64, f64); 5] = [
-    (Round::Rough, 50.0, 0.2),
-    (Round::Again, 30.0, 0.03),
-    (Round::Full, 20.0, 0.004),
-    (Round::Full, 15.0, 0.004),
-    (Round::Full, 15.0, 0.004),
+const ROUNDS: [Rung; 5] = [
+    rung(Round::Rough, 50.0, 0.2),
+    rung(Round::Again, 30.0, 0.03),
+    rung(Round::Full, 20.0, 0.004),
+    rung(Round::Full, 15.0, 0.004),
+    rung(Round::Full, 15.0, 0.004),
 ];
 
 /// The same for several effects together, of which more are tried.
-pub(super) const ROUNDS_OF_SEVERAL: [(Round, f64, f64); 6] = [
-    (Round::Rough, 50.0, 0.06),
-    (Round::Again, 30.0, 0.02),
-    (Round::Again, 25.0, 0.006),
-    (Round::Full, 15.0, 0.004),
-    (Round::Full, 15.0, 0.004),
-    (Round::Full, 15.0, 0.004),
+pub(super) const ROUNDS_OF_SEVERAL: [Rung; 6] = [
+    rung(Round::Rough, 50.0, 0.06),
+    rung(Round::Again, 30.0, 0.02),
+    rung(Round::Again, 25.0, 0.006),
+    rung(Round::Full, 15.0, 0.004),
+    rung(Round::Full, 15.0, 0.004),
+    rung(Round::Full, 15.0, 0.004),
 ];
 
 /// The same beside an effect that explains nearly all, from where there is not far to go.
-pub(super) const ROUNDS_BESIDE: [(Round, f64, f64); 6] = [
-    (Round::Rough, 50.0, 0.001),
-    (Round::Again, 30.0, 0.0005),
-    (Round::Again, 25.0, 0.0002),
-    (Round::Full, 15.0, 0.0001),
-    (Round::Full, 15.0, 0.0001),
-    (Round::Full, 15.0, 0.0001),
+pub(super) const ROUNDS_BESIDE: [Rung; 6] = [
+    rung(Round::Rough, 50.0, 0.001),
+    rung(Round::Again, 30.0, 0.0005),
+    rung(Round::Again, 25.0, 0.0002),
+    rung(Round::Full, 15.0, 0.0001),
+    rung(Round::Full, 15.0, 0.0001),
+    rung(Round::Full, 15.0, 0.0001),
 ];
 
 /// The same for hypotheses of many numbers that are linear in what they do.
-const ROUNDS_OF_GROUPS: [(Round, f64, f64); 2] = [(Round::Rough, 30.0, 0.05), (Round::Full, 20.0, 0.015)];
+const ROUNDS_OF_GROUPS: [Rung; 2] = [rung(Round::Rough, 30.0, 0.05), rung(Round::Full, 20.0, 0.015)];
 
 /// The same from where there is hardly any way to go.
-const ROUNDS_FROM_NEAR: [(Round, f64, f64); 2] = [(Round::Full, 30.0, 0.004), (Round::Full, 15.0, 0.004)];
+const ROUNDS_FROM_NEAR: [Rung; 2] = [rung(Round::Full, 30.0, 0.004), rung(Round::Full, 15.0, 0.004)];
 
 /// Explanations beside which a further effect is sought: the best need not be part of the best with one more.
 pub(super) const BASES: usize = 2;
@@ -274,7 +283,7 @@ impl Search<'_> {
     pub(super) fn descend_several(
         &self,
         starts: &[Hypothesis],
-        rounds: &Rounds,
+        rounds: &[Rung],
         reached: f64,
     ) -> Vec<Descent> {
         let mut descents = self.descend(starts.iter(), rounds, reached);
@@ -406,7 +415,7 @@ impl Search<'_> {
     fn try_rounds<'h>(
         &self,
         hypotheses: impl Iterator<Item = &'h Hypothesis>,
-        rounds: &Rounds,
+        rounds: &[Rung],
     ) -> Vec<Found> {
         self.settle(self.descend(hypotheses, rounds, f64::NEG_INFINITY))
     }
@@ -416,7 +425,7 @@ impl Search<'_> {
     fn descend<'h>(
         &self,
         hypotheses: impl Iterator<Item = &'h Hypothesis>,
-        rounds: &Rounds,
+        rounds: &[Rung],
         reached: f64,
     ) -> Vec<Descent> {
         /// Descents that go on where none seems to come to an end, or the others seem to lose.
@@ -424,7 +433,7 @@ impl Search<'_> {
         let mut alive: Vec<Descent> = hypotheses
             .map(|start| Descent::start(self.atlas, start))
             .collect();
-        for &(round, behind, share) in rounds {
+        for &Rung { round, behind, share } in rounds {
             if alive.is_empty() {
                 break;
             }

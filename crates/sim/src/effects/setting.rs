@@ -50,11 +50,11 @@ impl Setting {
         }
     }
 
-    /// The values at the start of a run and their change per second.
+    /// The values at the start of a run and their change per second; `index` is the place in the list of effects.
     ///
     /// # Errors
     /// A run beyond the list of a pattern by run.
-    pub fn values(&self, run: usize) -> Result<(&[f64], Option<&[f64]>), Error> {
+    pub fn values(&self, index: usize, run: usize) -> Result<(&[f64], Option<&[f64]>), Error> {
         match &self.pattern {
             Pattern::Constant(values) => Ok((values, None)),
             Pattern::ByTime { start, per_s } => Ok((start, Some(per_s))),
@@ -62,9 +62,10 @@ impl Setting {
                 runs.get(run)
                     .map(|values| (values.as_slice(), None))
                     .ok_or(Error::Invalid {
-                        key: format!("effect.{}", self.spec.name),
+                        key: format!("effect.{index}.by"),
                         reason: format!(
-                            "has values for {} runs and is asked for run {}",
+                            "{} has values for {} runs by run, and there is a run {}",
+                            self.spec.name,
                             runs.len(),
                             run + 1
                         ),
@@ -163,16 +164,16 @@ pub(crate) struct Active {
 impl Active {
     /// The effects of one run in the order in which they act.
     pub(crate) fn all(settings: &[Setting], run: usize) -> Result<Vec<Self>, Error> {
-        let mut ordered: Vec<&Setting> = settings.iter().collect();
-        ordered.sort_by_key(|setting| setting.order());
+        let mut ordered: Vec<(usize, &Setting)> = settings.iter().enumerate().collect();
+        ordered.sort_by_key(|(_, setting)| setting.order());
         ordered
             .into_iter()
-            .map(|setting| Self::new(setting, run))
+            .map(|(index, setting)| Self::new(index, setting, run))
             .collect()
     }
 
-    fn new(setting: &Setting, run: usize) -> Result<Self, Error> {
-        let (start, per_s) = setting.values(run)?;
+    fn new(index: usize, setting: &Setting, run: usize) -> Result<Self, Error> {
+        let (start, per_s) = setting.values(index, run)?;
         Ok(Self {
             values: start.to_vec(),
             start: start.to_vec(),

@@ -246,7 +246,9 @@ fn settings_that_mean_nothing_are_refused() {
         spec: find("wheel-scale").unwrap(),
         pattern: runs,
     };
-    assert!(setting.values(0).is_ok() && setting.values(1).is_err());
+    assert!(setting.values(0, 0).is_ok());
+    let beyond = setting.values(2, 1).unwrap_err();
+    assert_eq!(beyond.key(), Some("effect.2.by"));
     let unknown = find("whel-scale").unwrap_err().to_string();
     assert_eq!(unknown, "unknown effect `whel-scale`; nearest known: wheel-scale");
     assert_eq!(active("wheel-scale", &[1.0]).values, [1.0]);
