@@ -236,11 +236,10 @@ fn setting(index: usize, effect: &config::Effect) -> Result<Setting, sim::Error>
             ));
         }
     }
-    let does = |param: &&sim::Param| param.neutral.is_some();
-    let mut sized = spec.params.iter().filter(does).chain(&spec.list).peekable();
+    let sized: Vec<&sim::Param> = spec.params.iter().filter(|p| p.neutral.is_some()).collect();
     let given = |name: &str| effect.parameters.contains_key(name);
-    if sized.peek().is_some() && !sized.clone().any(|p| given(p.name) || given(&slope_key(p))) {
-        let names: Vec<&str> = sized.map(|p| p.name).collect();
+    if !sized.is_empty() && !sized.iter().any(|p| given(p.name) || given(&slope_key(p))) {
+        let names: Vec<&str> = sized.iter().map(|p| p.name).collect();
         let reason = format!("{} without `{}` does nothing", spec.name, names.join("` or `"));
         return Err(invalid("kind", reason));
     }

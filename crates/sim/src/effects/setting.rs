@@ -64,10 +64,9 @@ impl Setting {
                     .ok_or(Error::Invalid {
                         key: format!("effect.{index}.by"),
                         reason: format!(
-                            "{} has values for {} runs by run, and there is a run {}",
+                            "{} has values by run for {} of them, and there are more",
                             self.spec.name,
                             runs.len(),
-                            run + 1
                         ),
                     })
             }
