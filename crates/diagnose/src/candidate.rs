@@ -93,6 +93,22 @@ pub(crate) fn label(setting: &Setting) -> String {
     format!("{}{fixed}{pattern}", spec.name)
 }
 
+/// Values of [`UNLISTED`] before its coefficients: what it acts on, what it depends on, and the basis.
+pub(crate) const WORDS: usize = 3;
+
+/// The values of an effect without a name that does nothing yet, with so many coefficients; `None` if it knows no such word.
+pub(crate) fn unlisted_values(words: [&str; WORDS], coefficients: usize) -> Option<Vec<f64>> {
+    let number = |(param, word): (&Param, &str)| {
+        let place = param.choices.iter().position(|choice| *choice == word);
+        place.map(|place| place as f64)
+    };
+    let mut values: Vec<f64> = (UNLISTED.params.iter().zip(words))
+        .map(number)
+        .collect::<Option<_>>()?;
+    values.resize(WORDS + coefficients, 0.0);
+    Some(values)
+}
+
 /// Where a parameter goes round: the range that holds each of its values once. Angles and places on a closed wall do.
 pub(crate) fn round(param: &Param) -> Option<Range<f64>> {
     const PI: f64 = std::f64::consts::PI;

@@ -1,16 +1,14 @@
 //! Causes without a name: groups of basis functions of what a cause may depend on.
 
 use nalgebra::{DMatrix, DVector};
-use sim::{Spec, UNLISTED};
+use sim::UNLISTED;
 
 use super::atlas::{Atlas, Simulate, White};
 use super::hypothesis::{Hypothesis, Part};
 use super::probe::Probe;
 use super::screen::price;
 use super::steadiness::Settling;
-
-/// Values of [`UNLISTED`] before its coefficients: what it acts on, what it depends on, and the basis.
-const WORDS: usize = 3;
+use crate::candidate::{WORDS, unlisted_values};
 
 /// Data sets simulated for each coefficient.
 const GROUP_SETS: u64 = 2;
@@ -43,17 +41,11 @@ fn group(
     scales: &[f64],
     first: usize,
 ) -> Option<Probe> {
-    let spec: &'static Spec = &UNLISTED;
-    let number = |i: usize, word: &str| {
-        let place = spec.params[i].choices.iter().position(|name| *name == word);
-        place.map(|place| place as f64)
-    };
-    let mut origin = vec![number(0, target)?, number(1, dependence)?, number(2, basis)?];
-    origin.resize(WORDS + scales.len(), 0.0);
+    let origin = unlisted_values([target, dependence, basis], scales.len())?;
     let free = (first..scales.len())
         .map(|i| (WORDS + i, step * scales[i]))
         .collect();
-    Some(Probe::group(spec, origin, free))
+    Some(Probe::group(&UNLISTED, origin, free))
 }
 
 /// The basis of what settles while a run goes on. Only what was seen to settle is tried with it.

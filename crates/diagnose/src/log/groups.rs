@@ -3,10 +3,7 @@
 use sim::{Setting, Stage, UNLISTED};
 
 use super::catalogue::{Shape, Variant};
-use crate::candidate::stage_of;
-
-/// Values before the coefficients: what a cause acts on and depends on, and its basis.
-pub(crate) const WORDS: usize = 3;
+use crate::candidate::{WORDS, stage_of, unlisted_values};
 
 /// Times, s, between those of a lap and of a run, about which what settles is sought.
 const SETTLE_WITHIN_S: [f64; 7] = [15.0, 30.0, 60.0, 120.0, 240.0, 480.0, 960.0];
@@ -58,12 +55,7 @@ pub(crate) fn settling_variants(stage: Stage) -> Vec<Variant> {
 
 /// A target with a dependence on a basis, and the sizes of its terms relative to the target's step.
 fn group(target: &str, [dependence, basis]: [&str; 2], scales: &[f64]) -> Option<Variant> {
-    let number = |i: usize, word: &str| {
-        let place = UNLISTED.params[i].choices.iter().position(|name| *name == word);
-        place.map(|place| place as f64)
-    };
-    let mut values = vec![number(0, target)?, number(1, dependence)?, number(2, basis)?];
-    values.resize(WORDS + scales.len(), 0.0);
+    let values = unlisted_values([target, dependence, basis], scales.len())?;
     // About a percent, a millimetre, a count or a hundredth of a radian per second.
     let step = match target {
         "side slip" | "camera x" | "camera y" => 5e-4,

@@ -6,10 +6,11 @@ use statrs::statistics::Statistics;
 
 use super::catalogue::Variant;
 use super::evidence::Evidence;
-use super::groups::{WORDS, wheel_variants};
+use super::groups::wheel_variants;
 use super::leads::{By, Lead, by_run, start};
 use super::refined::{Refined, together};
 use super::screen::normals;
+use crate::candidate::WORDS;
 
 /// Steps of a refinement at most.
 const STEPS: usize = 8;
