@@ -25,14 +25,35 @@ pub struct Candidate {
 }
 
 impl Candidate {
-    /// The 95 % interval of a fitted value by its place in the order of the pattern's values; the value itself, twice, if it was
-    /// chosen.
+    /// The 95 % interval of a fitted value by its place in the order of the pattern's values, inside its parameter's range; the value
+    /// itself, twice, if it was chosen.
     pub fn interval(&self, place: usize) -> [f64; 2] {
         /// Half width in standard errors.
         const HALF_WIDTH: f64 = 1.96;
-        let reach = HALF_WIDTH * self.standard_errors[place];
-        let value = self.setting.pattern.numbers()[place];
-        (self.intervals.get(&place).copied()).unwrap_or([value - reach, value + reach])
+        if let Some(interval) = self.intervals.get(&place) {
+            return *interval;
+        }
+        let (value, reach) = (
+            self.setting.pattern.numbers()[place],
+            HALF_WIDTH * self.standard_errors[place],
+        );
+        let range = self.param(place).filter(|param| round(param).is_none());
+        let [low, high] = range.map_or([f64::NEG_INFINITY, f64::INFINITY], |param| {
+            [param.low, param.high]
+        });
+        [(value - reach).max(low), (value + reach).min(high)]
+    }
+
+    /// The parameter of a value by its place in the order of the pattern's values; `None` of a change per second.
+    fn param(&self, place: usize) -> Option<&'static Param> {
+        let Setting { spec, pattern } = &self.setting;
+        let own = match pattern {
+            Pattern::Constant(_) => place,
+            Pattern::ByRun(_) => place % spec.params.len(),
+            Pattern::ByTime { start, .. } if place >= start.len() => return None,
+            Pattern::ByTime { .. } => place,
+        };
+        spec.params.get(own).or(spec.list.as_ref())
     }
 
     /// The stage of the loop in which it acts.
@@ -226,6 +247,36 @@ mod tests {
         // 3 off the mean and known to 4.
         assert_eq!(errors, [4.0, 5.0, 4.0]);
         assert!(filled(&[None, None]).is_none());
+    }
+
+    #[test]
+    fn intervals_stay_in_their_parameters_range_and_may_be_open() {
+        let mut noise = Candidate {
+            setting: Setting::constant(find("reading-noise").unwrap(), [0.06]),
+            standard_errors: vec![0.1],
+            intervals: BTreeMap::new(),
+            gain: 1.0,
+            fitted: 1,
+        };
+        let near =
+            |[low, high]: [f64; 2], [a, b]: [f64; 2]| (low - a).abs() < 1e-12 && (high - b).abs() < 1e-12;
+        assert!(near(noise.interval(0), [0.0, 0.256]));
+        noise.intervals.insert(0, [0.05, 3.0]);
+        assert_eq!(noise.interval(0), [0.05, 3.0]);
+        // A change per second has no range, and an angle goes round.
+        let tilt = Candidate {
+            setting: Setting {
+                spec: find("floor-tilt").unwrap(),
+                pattern: Pattern::ByTime {
+                    start: vec![1e-3, 3.1],
+                    per_s: vec![-1e-6, 0.0],
+                },
+            },
+            standard_errors: vec![1e-4, 0.1, 1e-7, 0.0],
+            ..noise
+        };
+        assert!(near(tilt.interval(1), [2.904, 3.296]));
+        assert!(near(tilt.interval(2), [-1e-6 - 1.96e-7, -1e-6 + 1.96e-7]));
     }
 
     #[test]
