@@ -41,7 +41,9 @@ const WORTH: f64 = 10.0;
 const WORTH_BESIDE: f64 = 15.0;
 /// Share of what is explained already that further effects must gain, unless they alone fit: at very high signal no model is
 /// exact.
-const FAULTS: f64 = 0.001;
+const FAULTS: f64 = 2e-4;
+/// Share that one effect must explain for what is left to be a fault of the model rather than a cause without a name.
+const ALL_BUT_FAULTS: f64 = 0.999;
 
 /// Single effects of which the sizes are let go over the runs or in time, and several together.
 const PATTERNS_OF: usize = 3;
@@ -261,7 +263,7 @@ fn explain(search: &Search<'_>, mut found: Vec<Found>) -> Vec<Found> {
     }
     // No cause without a name explains what several with theirs explain nearly all of, or one but for the faults of models.
     let nearly_all =
-        |best: &Explanation| best.share >= 1.0 - FAULTS || best.effects.len() > 1 && best.share >= ENOUGH;
+        |best: &Explanation| best.share >= ALL_BUT_FAULTS || best.effects.len() > 1 && best.share >= ENOUGH;
     if !first_is(&found, |best| suffices(best) || nearly_all(best)) {
         let unnamed = search.unnamed(&found);
         found = unless_named(found, unnamed);

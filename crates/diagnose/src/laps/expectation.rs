@@ -97,6 +97,13 @@ impl Expected {
         expected
     }
 
+    /// Leaves a share of how its numbers of all runs differ from others: its trend and what is of second order.
+    pub(super) fn draw_towards(&mut self, other: &Self, share: f64) {
+        for (own, other) in [(&mut self.trend, &other.trend), (&mut self.second, &other.second)] {
+            own.axpy(1.0 - share, other, share);
+        }
+    }
+
     /// Gives all runs the mean of their means.
     fn pool(&mut self) {
         let pooled = self.means.iter().sum::<DVector<f64>>() / self.means.len() as f64;

@@ -122,26 +122,31 @@ impl Atlas {
         look: &LastLook,
     ) -> Result<Hypothesis, Error> {
         let (recording, place) = self.layout.places().nth(run).unwrap_or_default();
-        let alone = self.layout.laps[recording].len() == 1;
+        let expected = &local.center.expectation.0[recording];
+        let of_all_runs = [self.layout.trend(recording), self.layout.second(recording)];
+        let mut silent = vec![self.layout.run(run)];
         let mut data = self.observed(runs)?;
-        if !alone {
+        let count = self.layout.laps[recording].len();
+        if count > 1 {
             data.0[recording] = self.observed_without(runs, run)?.0.remove(recording);
+        } else {
+            data.0[recording].means.clear();
+            silent.extend(of_all_runs.clone());
         }
         data.0[recording]
             .means
-            .insert(place, local.center.expectation.0[recording].means[place].clone());
-        if alone {
-            data.0[recording].means.truncate(1);
-        }
-        let mut own = vec![self.layout.run(run)];
-        if alone {
-            own.extend([self.layout.trend(recording), self.layout.second(recording)]);
-        }
+            .insert(place, expected.means[place].clone());
+        // Numbers of all runs scatter more without one of them, and tell as much less.
+        let told = ((count - 1) as f64 / count as f64).sqrt();
+        data.0[recording].draw_towards(expected, told);
         let mut columns = local.columns.clone();
         for column in &mut columns {
-            for range in &own {
-                column.slope.rows_mut(range.start, range.len()).fill(0.0);
-                column.curvature.rows_mut(range.start, range.len()).fill(0.0);
+            for action in [&mut column.slope, &mut column.curvature] {
+                for range in &of_all_runs {
+                    action.rows_mut(range.start, range.len()).scale_mut(told);
+                }
+                let own = &silent[0];
+                action.rows_mut(own.start, own.len()).fill(0.0);
             }
         }
         let nearest = self.nearest(
@@ -150,7 +155,7 @@ impl Atlas {
             &local.scatter,
             &columns,
             &look.freedoms,
-            &own,
+            &silent,
         );
         let found = self.with_moves(&look.about, &look.freedoms, &nearest.moves);
         // The run itself is as expected, and so has no say.

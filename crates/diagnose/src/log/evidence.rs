@@ -12,7 +12,7 @@ use super::filter::{Trace, Used, clear_readings, filter, leads_elsewhere, likeli
 use super::rows::{LogRow, stretches};
 use super::screen::{Normal, normal_of};
 use super::steps::WHOLE;
-use crate::candidate::{stage_of, within};
+use crate::candidate::{apart, stage_of, within};
 
 /// A stretch of one run's log and what of it counts.
 #[derive(Debug, Clone)]
@@ -76,6 +76,13 @@ impl Knob {
             *value = within(*value, param);
         }
         turned
+    }
+
+    /// How many steps the value moves from one list of settings to another.
+    fn steps(&self, from: &[Setting], to: &[Setting]) -> f64 {
+        let param = from[self.setting].spec.params.get(self.value);
+        let [from, to] = [from, to].map(|settings| *self.of(&mut settings.to_vec()));
+        apart(to, from, param.filter(|_| !self.slope)) / self.step
     }
 }
 
@@ -272,7 +279,7 @@ impl<'a> Evidence<'a> {
         })
     }
 
-    /// Change of the whitened innovations for one step of each knob, from the side that is inside its range.
+    /// Change of the whitened innovations for one step of each knob, from the side with more of its range.
     fn derivatives(
         &self,
         world: &World<'a>,
@@ -280,15 +287,18 @@ impl<'a> Evidence<'a> {
         settings: &[Setting],
         knobs: &[Knob],
     ) -> Option<Vec<Vec<f32>>> {
+        /// A step but for its rounding.
+        const WHOLE: f64 = 0.999;
         let turned = |knob: &Knob| {
-            let up = knob.turned(settings, 1.0);
-            if up == settings {
-                (-1.0, knob.turned(settings, -1.0))
-            } else {
-                (1.0, up)
-            }
+            let [up, down] = [1.0, -1.0].map(|multiple| {
+                let side = knob.turned(settings, multiple);
+                (knob.steps(settings, &side), side)
+            });
+            // A range may end within a step.
+            let is_cut = up.0.abs() < WHOLE.min(down.0.abs());
+            if is_cut { down } else { up }
         };
-        let sides: Vec<(f32, Vec<Setting>)> = knobs.iter().map(turned).collect();
+        let sides: Vec<(f64, Vec<Setting>)> = knobs.iter().map(turned).collect();
         let worlds: Vec<World<'a>> = (sides.iter())
             .map(|(_, side)| self.world(side, world.run()).ok())
             .collect::<Option<_>>()?;
@@ -299,9 +309,39 @@ impl<'a> Evidence<'a> {
             })
             .collect::<Option<Vec<_>>>()?;
         let mut found = columns(others, trace);
-        for (column, (sign, _)) in found.iter_mut().zip(&sides) {
-            column.iter_mut().for_each(|c| *c *= sign);
+        for (column, (steps, _)) in found.iter_mut().zip(&sides) {
+            let whole = if *steps == 0.0 { 0.0 } else { steps.recip() as f32 };
+            column.iter_mut().for_each(|c| *c *= whole);
         }
         Some(found)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use sim::find;
+
+    use super::*;
+
+    #[test]
+    fn a_step_that_the_end_of_a_range_cuts_short_is_less_than_one() {
+        let knob = |step: f64, value: usize| Knob {
+            setting: 0,
+            value,
+            slope: false,
+            step,
+        };
+        let moved = |setting: &Setting, knob: &Knob, multiple: f64| {
+            let settings = [setting.clone()];
+            knob.steps(&settings, &knob.turned(&settings, multiple))
+        };
+        let spec = find("reading-noise").unwrap();
+        let quiet = Setting::constant(spec, [0.02]);
+        let knob_of_noise = knob(0.08, 0);
+        assert!((moved(&quiet, &knob_of_noise, 1.0) - 1.0).abs() < 1e-12);
+        assert!((moved(&quiet, &knob_of_noise, -1.0) + 0.25).abs() < 1e-12);
+        // An angle goes round.
+        let tilt = Setting::constant(find("floor-tilt").unwrap(), [1e-3, 3.1]);
+        assert!((moved(&tilt, &knob(0.15, 1), 1.0) - 1.0).abs() < 1e-12);
     }
 }
