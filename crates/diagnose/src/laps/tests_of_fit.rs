@@ -32,15 +32,20 @@ impl Quadratic {
         Self { q, freedom, p }
     }
 
-    /// A sum in units of a covariance that was estimated from [`NULL_SETS`] data sets and enlarged so that the sum's expectation is
-    /// its number: Hotelling's T^2, which has heavier tails.
-    fn of_estimated(q: f64, freedom: usize) -> Self {
-        let (n, p) = (NULL_SETS as f64 - 1.0, freedom as f64);
-        let t2 = q * n / (n - p - 1.0);
-        let f = t2 * (n - p + 1.0) / (n * p);
+    /// A sum over recordings, of so many squares each in units of a covariance that was estimated from [`NULL_SETS`] data sets and
+    /// enlarged so that the sum's expectation is its number. Of one it is Hotelling's T^2, which has heavier tails than chi^2; of
+    /// several it is taken for F with the mean and the variance of their sum.
+    fn of_estimated(q: f64, recordings: usize, each: usize) -> Self {
         // Beyond this the tail is 0, and its continued fraction has no value.
         const ENORMOUS: f64 = 1e12;
-        let tail = FisherSnedecor::new(p, n - p + 1.0).map_or(1.0, |law| law.sf(f.min(ENORMOUS)));
+        let freedom = recordings * each;
+        let (p, total) = (each as f64, freedom as f64);
+        let of_one = NULL_SETS as f64 - p;
+        // Variance beyond that of chi^2.
+        let wider = (p + of_one - 2.0) / (of_one - 4.0);
+        let of_all = (total - 2.0 + 4.0 * wider) / (wider - 1.0);
+        let f = q / total * of_all / (of_all - 2.0);
+        let tail = FisherSnedecor::new(total, of_all).map_or(1.0, |law| law.sf(f.min(ENORMOUS)));
         Self { q, freedom, p: tail }
     }
 
@@ -87,7 +92,7 @@ impl FourNumbers {
             mean: Quadratic::new(means, recordings * layout.lap),
             runs: Quadratic::new(all - means, (layout.runs() - recordings) * layout.lap),
             trend: Quadratic::new(each(&|g| layout.trend(g)), recordings * layout.lap),
-            noise: Quadratic::of_estimated(each(&|g| layout.second(g)), recordings * SECOND),
+            noise: Quadratic::of_estimated(each(&|g| layout.second(g)), recordings, SECOND),
         }
     }
 
@@ -129,15 +134,49 @@ impl FourNumbers {
 
 #[cfg(test)]
 mod tests {
+    use sim::Streams;
+
     use super::*;
 
     #[test]
     fn enormous_sums_are_no_chance() {
         for q in [1e3, 1e9, 1e20, 1e300, f64::INFINITY] {
-            let found = Quadratic::of_estimated(q, SECOND);
+            let found = Quadratic::of_estimated(q, 1, SECOND);
             assert!(found.p < 1e-9, "{found:?}");
         }
-        let usual = Quadratic::of_estimated(SECOND as f64, SECOND).p;
+        let usual = Quadratic::of_estimated(SECOND as f64, 1, SECOND).p;
         assert!((0.3..0.7).contains(&usual), "{usual}");
+    }
+
+    #[test]
+    fn one_recording_has_hotellings_law() {
+        let (n, p) = (NULL_SETS as f64 - 1.0, SECOND as f64);
+        for q in [10.0, 21.0, 40.0, 60.0] {
+            // With the mean p.
+            let t2 = q * n / (n - p - 1.0);
+            let law = FisherSnedecor::new(p, n - p + 1.0).unwrap();
+            let exact = law.sf(t2 * (n - p + 1.0) / (n * p));
+            let found = Quadratic::of_estimated(q, 1, SECOND).p;
+            assert!((found / exact - 1.0).abs() < 1e-9, "{q}: {found} {exact}");
+        }
+    }
+
+    #[test]
+    fn sums_over_recordings_are_as_often_large_as_they_should_be() {
+        const DRAWS: usize = 4000;
+        let mut stream = Streams { seed: 7, run: 0 }.open("noise");
+        let mut square = |count: usize| (0..count).map(|_| stream.normal().powi(2)).sum::<f64>();
+        let below = NULL_SETS as usize - SECOND;
+        for recordings in [2, 10] {
+            let of_one =
+                |square: &mut dyn FnMut(usize) -> f64| square(SECOND) / square(below) * (below as f64 - 2.0);
+            let rare = (0..DRAWS).filter(|_| {
+                let q = (0..recordings).map(|_| of_one(&mut square)).sum();
+                Quadratic::of_estimated(q, recordings, SECOND).p < 0.01
+            });
+            let rare = rare.count();
+            // Forty, with a standard deviation of six.
+            assert!((22..=58).contains(&rare), "{recordings}: {rare}");
+        }
     }
 }
