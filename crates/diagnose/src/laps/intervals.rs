@@ -64,13 +64,14 @@ impl Atlas {
 /// more slowly than the parabola of a standard error; infinite if it does not within another distance, `None` where the
 /// parabola holds.
 fn slow_reach(fall: impl Fn(f64) -> f64, error: f64, far: f64) -> Option<f64> {
-    /// Share of the parabola's fall below which it is slow.
+    /// Share of the parabola's fall below which it is slow. The noise of simulations is not so both there and twice as far out.
     const SLOW: f64 = 0.25;
-    let mut near = COMPARED * error;
-    let mut fallen = fall(near);
-    if fallen > SLOW * 0.5 * COMPARED * COMPARED {
-        return None;
-    }
+    let slow = |distance: f64| {
+        let fallen = fall(distance);
+        (fallen < SLOW * 0.5 * (distance / error).powi(2)).then_some(fallen)
+    };
+    let (mut near, mut fallen) = (COMPARED * error, slow(COMPARED * error)?);
+    slow(2.0 * COMPARED * error)?;
     while near < far {
         let next = 2.0 * near;
         let there = fall(next);
