@@ -126,12 +126,7 @@ impl OutDir {
     /// It is there and cannot be removed.
     pub(crate) fn remove(&self, name: &str) -> Result<()> {
         let path = self.at(name)?;
-        let removed = match path.symlink_metadata() {
-            Ok(what) if what.is_dir() => fs::remove_dir_all(&path),
-            Ok(_) => fs::remove_file(&path),
-            Err(_) => Ok(()),
-        };
-        removed.with_context(|| format!("cannot remove {}", path.display()))
+        remove_if_there(&path).with_context(|| format!("cannot remove {}", path.display()))
     }
 
     /// Writes the manifest and gives the folder its name, in place of our earlier one.
@@ -196,13 +191,18 @@ fn remove_ours(partial: &Path) -> std::io::Result<()> {
         if entry.file_name() == MARKER {
             continue;
         }
-        if entry.file_type()?.is_dir() {
-            fs::remove_dir_all(entry.path())?;
-        } else {
-            fs::remove_file(entry.path())?;
-        }
+        remove_if_there(&entry.path())?;
     }
     fs::remove_dir_all(partial)
+}
+
+/// Removes a file, or a folder with all that is in it.
+fn remove_if_there(path: &Path) -> std::io::Result<()> {
+    match path.symlink_metadata() {
+        Ok(what) if what.is_dir() => fs::remove_dir_all(path),
+        Ok(_) => fs::remove_file(path),
+        Err(_) => Ok(()),
+    }
 }
 
 fn beside(dir: &Path, ending: &str) -> Result<PathBuf> {

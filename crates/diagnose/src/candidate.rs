@@ -7,6 +7,9 @@ use sim::{Param, Pattern, Setting, Stage, UNLISTED};
 
 use crate::Cause;
 
+/// Half width of a 95 % interval in standard errors.
+pub(crate) const HALF_WIDTH_95: f64 = 1.96;
+
 /// An effect that might explain what the model lacks, with its fitted size.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Candidate {
@@ -28,14 +31,12 @@ impl Candidate {
     /// The 95 % interval of a fitted value by its place in the order of the pattern's values, inside its parameter's range; the value
     /// itself, twice, if it was chosen.
     pub fn interval(&self, place: usize) -> [f64; 2] {
-        /// Half width in standard errors.
-        const HALF_WIDTH: f64 = 1.96;
         if let Some(interval) = self.intervals.get(&place) {
             return *interval;
         }
         let (value, reach) = (
             self.setting.pattern.numbers()[place],
-            HALF_WIDTH * self.standard_errors[place],
+            HALF_WIDTH_95 * self.standard_errors[place],
         );
         let range = self.param(place).filter(|param| round(param).is_none());
         let [low, high] = range.map_or([f64::NEG_INFINITY, f64::INFINITY], |param| {
@@ -53,7 +54,7 @@ impl Candidate {
             Pattern::ByTime { start, .. } if place >= start.len() => return None,
             Pattern::ByTime { .. } => place,
         };
-        spec.params.get(own).or(spec.list.as_ref())
+        spec.param(own)
     }
 
     /// The stage of the loop in which it acts.

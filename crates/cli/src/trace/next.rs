@@ -242,15 +242,14 @@ fn first_runs(settings: &[Setting]) -> Vec<Setting> {
 
 /// The relative error of an effect's size: the least of its fitted values'.
 fn relative_error(effect: &Candidate) -> f64 {
-    let params = effect.setting.spec.params;
-    let numbers = effect.setting.pattern.numbers().into_iter();
-    // Of what changes in time the size at the start counts.
-    let sizes = match effect.setting.pattern {
-        sim::Pattern::ByTime { .. } => params.len(),
-        _ => usize::MAX,
+    let values = match &effect.setting.pattern {
+        sim::Pattern::Constant(values) => values.clone(),
+        sim::Pattern::ByTime { start, .. } => start.clone(),
+        sim::Pattern::ByRun(runs) => runs.concat(),
     };
-    numbers
-        .take(sizes)
+    let params = effect.setting.spec.params;
+    values
+        .iter()
         .zip(&effect.standard_errors)
         .enumerate()
         .filter(|(_, (_, error))| **error > 0.0)

@@ -626,7 +626,7 @@ impl Hypothesis {
                 Some(i) => {
                     let runs = freedom.run.map_or(0..part.values.len(), |run| run..run + 1);
                     for values in &mut part.values[runs] {
-                        let param = spec.params.get(i).or(spec.list.as_ref());
+                        let param = spec.param(i);
                         values[i] = param.map_or(values[i] + by, |param| within(values[i] + by, param));
                     }
                 }

@@ -5,10 +5,10 @@ use super::atlas::{Atlas, Simulate};
 use super::expectation::Expectation;
 use super::hypothesis::{Freedom, Hypothesis};
 use super::parabola::{Column, Local};
+use crate::candidate::HALF_WIDTH_95;
 
-/// Standard errors at the ends of a 95 % interval, and the fall of the log-likelihood there (Wilks 1938).
-const ENDS: f64 = 1.96;
-const FALL: f64 = 0.5 * ENDS * ENDS;
+/// The fall of the log-likelihood at the ends of a 95 % interval (Wilks 1938).
+const FALL: f64 = 0.5 * HALF_WIDTH_95 * HALF_WIDTH_95;
 /// Standard errors at which a likelihood is compared with their parabola.
 const COMPARED: f64 = 4.0;
 
@@ -71,10 +71,10 @@ fn slow_reach(fall: impl Fn(f64) -> f64, error: f64, far: f64) -> Option<f64> {
         (fallen < SLOW * 0.5 * (distance / error).powi(2)).then_some(fallen)
     };
     let (mut near, mut fallen) = (COMPARED * error, slow(COMPARED * error)?);
-    slow(2.0 * COMPARED * error)?;
+    let mut twice_as_far = Some(slow(2.0 * near)?);
     while near < far {
         let next = 2.0 * near;
-        let there = fall(next);
+        let there = twice_as_far.take().unwrap_or_else(|| fall(next));
         if there > FALL {
             let share = (FALL - fallen) / (there - fallen);
             return Some(near + share.clamp(0.0, 1.0) * (next - near));
@@ -114,14 +114,14 @@ mod tests {
     #[test]
     fn a_wider_parabola_has_its_own_end() {
         let reach = slow_reach(|distance| 0.5 * (distance / 3.0).powi(2), 0.3, 50.0).unwrap();
-        assert!((reach / (ENDS * 3.0) - 1.0).abs() < 0.1, "{reach}");
+        assert!((reach / (HALF_WIDTH_95 * 3.0) - 1.0).abs() < 0.1, "{reach}");
     }
 
     #[test]
     fn a_steep_side_ends_near() {
         for deviation in [0.05_f64, 0.3, 0.5] {
             let found = reach(|distance| 0.5 * (distance / deviation).powi(2), 0.3);
-            assert!((found - ENDS * deviation).abs() < 0.02, "{found}");
+            assert!((found - HALF_WIDTH_95 * deviation).abs() < 0.02, "{found}");
         }
     }
 

@@ -178,6 +178,11 @@ pub struct Spec {
 }
 
 impl Spec {
+    /// The parameter of a value by its place: all beyond those of `params` are the list's, if there is one.
+    pub fn param(&self, place: usize) -> Option<&Param> {
+        self.params.get(place).or(self.list.as_ref())
+    }
+
     /// Whether its one parameter is a rate of change in the course of a run.
     pub fn drifts(&self) -> bool {
         matches!(self.params, [Param { name: "per_s", .. }])
