@@ -6,13 +6,14 @@ use std::ops::Range;
 use rayon::prelude::*;
 use sim::Setting;
 
-use super::atlas::{Atlas, Simulate, White, in_other_units, white};
+use super::atlas::{Atlas, White, in_other_units, white};
 use super::expectation::{Expectation, Scatter};
 use super::hypothesis::{Freedom, Hypothesis, Part};
 use super::parabola::groups;
 use super::refine::Descent;
 use super::screen::{Screened, without_directions};
 use super::search::{Search, WEAK};
+use super::trial::Trial;
 
 /// A hypothesis beside which another effect is sought.
 #[derive(Debug, Clone)]
@@ -40,6 +41,73 @@ impl Base {
     }
 }
 
+impl Trial<'_> {
+    /// A hypothesis whose numbers follow an effect beside it, in units of the declared model's scatter.
+    pub(super) fn following(&self, hypothesis: Hypothesis) -> Base {
+        Base {
+            scatter: None,
+            following: self.directions(&hypothesis, &self.atlas.scatter),
+            hypothesis,
+        }
+    }
+
+    /// A hypothesis whose numbers follow an effect beside it, in units of its own scatter if it explains nearly all.
+    pub(super) fn base(&self, hypothesis: Hypothesis) -> Base {
+        const SETS: u64 = 10;
+        const NEARLY_ALL: f64 = 0.95;
+        let scatter = (self.evaluate(&hypothesis, SETS)).and_then(|evaluated| {
+            let own = self.atlas.scatter_of(evaluated.summaries.iter(), 1)?;
+            let square = |from: &Expectation| white(&own, &self.atlas.layout, self.data, from).norm_squared();
+            let excess = |from: &Expectation| square(from) - self.atlas.layout.len() as f64;
+            let left = excess(&evaluated.expectation);
+            (left < (1.0 - NEARLY_ALL) * excess(&self.atlas.null)).then_some(own)
+        });
+        let units = scatter.as_ref().unwrap_or(&self.atlas.scatter);
+        Base {
+            following: self.directions(&hypothesis, units),
+            hypothesis,
+            scatter,
+        }
+    }
+
+    /// What the numbers of a hypothesis do, as orthonormal directions in units of a scatter.
+    fn directions(&self, hypothesis: &Hypothesis, scatter: &[Scatter]) -> Vec<White> {
+        const SETS: u64 = 4;
+        let mut directions: Vec<White> = Vec::new();
+        for group in groups(&hypothesis.freedoms(self.atlas)) {
+            let at = |sign: f64| {
+                let moves: Vec<(Freedom, f64)> = group.iter().map(|f| (*f, sign * f.step)).collect();
+                let moved = hypothesis.moved(self.atlas, &moves);
+                self.simulated_plainly(&moved.settings(self.atlas), 0..SETS)
+            };
+            let (Some(up), Some(down)) = (at(1.0), at(-1.0)) else {
+                continue;
+            };
+            let action = white(scatter, &self.atlas.layout, &up, &down);
+            for freedom in &group {
+                let own = freedom.own_share(&action, &self.atlas.layout);
+                directions.extend(without_directions(own, &directions).try_normalize(f64::MIN_POSITIVE));
+            }
+        }
+        directions
+    }
+
+    /// What an expectation leaves of the data, in units of a base's scatter, but for what the base's numbers can follow.
+    pub(super) fn left_beyond(&self, base: &Base, expected: &Expectation) -> White {
+        let scatter = base.scatter.as_ref().unwrap_or(&self.atlas.scatter);
+        base.beyond(white(scatter, &self.atlas.layout, self.data, expected))
+    }
+
+    /// What some simulated data sets leave of the data with further settings beside a base; see [`Trial::left_beyond`]. `None`
+    /// where the robot crashes.
+    pub(super) fn left_beside(&self, base: &Base, further: &[Setting], sets: Range<u64>) -> Option<White> {
+        let mut settings = base.hypothesis.settings(self.atlas);
+        settings.extend_from_slice(further);
+        let found = self.simulated_briefly(&settings, sets)?;
+        Some(self.left_beyond(base, &found))
+    }
+}
+
 impl Atlas {
     /// A hypothesis whose numbers stay as they are, in units of the declared model's scatter.
     pub(super) fn at_rest(&self, hypothesis: Hypothesis) -> Base {
@@ -48,67 +116,6 @@ impl Atlas {
             scatter: None,
             following: Vec::new(),
         }
-    }
-
-    /// A hypothesis whose numbers follow an effect beside it, in units of the declared model's scatter.
-    pub(super) fn following(&self, simulate: &Simulate<'_>, hypothesis: Hypothesis) -> Base {
-        Base {
-            scatter: None,
-            following: self.directions(simulate, &hypothesis, &self.scatter),
-            hypothesis,
-        }
-    }
-
-    /// A hypothesis whose numbers follow an effect beside it, in units of its own scatter if it explains nearly all.
-    pub(super) fn base(&self, simulate: &Simulate<'_>, data: &Expectation, hypothesis: Hypothesis) -> Base {
-        const SETS: u64 = 10;
-        const NEARLY_ALL: f64 = 0.95;
-        let scatter = (self.evaluate(simulate, &hypothesis, SETS)).and_then(|evaluated| {
-            let own = self.scatter_of(evaluated.summaries.iter(), 1)?;
-            let square = |from: &Expectation| white(&own, &self.layout, data, from).norm_squared();
-            let excess = |from: &Expectation| square(from) - self.layout.len() as f64;
-            let left = excess(&evaluated.expectation);
-            (left < (1.0 - NEARLY_ALL) * excess(&self.null)).then_some(own)
-        });
-        let units = scatter.as_ref().unwrap_or(&self.scatter);
-        Base {
-            following: self.directions(simulate, &hypothesis, units),
-            hypothesis,
-            scatter,
-        }
-    }
-
-    /// What the numbers of a hypothesis do, as orthonormal directions in units of a scatter.
-    fn directions(
-        &self,
-        simulate: &Simulate<'_>,
-        hypothesis: &Hypothesis,
-        scatter: &[Scatter],
-    ) -> Vec<White> {
-        const SETS: u64 = 4;
-        let mut directions: Vec<White> = Vec::new();
-        for group in groups(&hypothesis.freedoms(self)) {
-            let at = |sign: f64| {
-                let moves: Vec<(Freedom, f64)> = group.iter().map(|f| (*f, sign * f.step)).collect();
-                let moved = hypothesis.moved(self, &moves);
-                self.simulated_plainly(simulate, &moved.settings(self), 0..SETS)
-            };
-            let (Some(up), Some(down)) = (at(1.0), at(-1.0)) else {
-                continue;
-            };
-            let action = white(scatter, &self.layout, &up, &down);
-            for freedom in &group {
-                let own = freedom.own_share(&action, &self.layout);
-                directions.extend(without_directions(own, &directions).try_normalize(f64::MIN_POSITIVE));
-            }
-        }
-        directions
-    }
-
-    /// What an expectation leaves of the data, in units of a base's scatter, but for what the base's numbers can follow.
-    pub(super) fn left_beyond(&self, data: &Expectation, base: &Base, expected: &Expectation) -> White {
-        let scatter = base.scatter.as_ref().unwrap_or(&self.scatter);
-        base.beyond(white(scatter, &self.layout, data, expected))
     }
 
     /// Every probe in every pattern at its size that explains most of what a base leaves, but for what the base's numbers can
@@ -122,30 +129,9 @@ impl Atlas {
         };
         self.screen_by(&beyond(left), beyond)
     }
-
-    /// What some simulated data sets leave of the data with further settings beside a base; see [`Atlas::left_beyond`]. `None`
-    /// where the robot crashes.
-    pub(super) fn left_beside(
-        &self,
-        simulate: &Simulate<'_>,
-        data: &Expectation,
-        base: &Base,
-        further: &[Setting],
-        sets: Range<u64>,
-    ) -> Option<White> {
-        let mut settings = base.hypothesis.settings(self);
-        settings.extend_from_slice(further);
-        let found = self.simulated_briefly(simulate, &settings, sets)?;
-        Some(self.left_beyond(data, base, &found))
-    }
 }
 
 impl Search<'_> {
-    /// A hypothesis whose numbers follow an effect beside it, for these data.
-    pub(super) fn base(&self, hypothesis: Hypothesis) -> Base {
-        self.atlas.base(self.simulate, self.data, hypothesis)
-    }
-
     /// A base with each of the effects that explain best what it leaves, but for those that were tried and for those that
     /// jump: [`Search::scans_beside`] is for these.
     pub(super) fn beside(&self, base: &Base, left: &White, tried: &[Hypothesis]) -> Vec<Hypothesis> {
@@ -179,7 +165,7 @@ impl Search<'_> {
 
     /// What explains best what a base leaves, by paths: effects of its own and those that jump are left out.
     pub(super) fn screened_beside(&self, base: &Base, left: &White) -> Vec<Screened> {
-        let mut screened = self.atlas.screen_beside(base, left);
+        let mut screened = self.atlas().screen_beside(base, left);
         screened
             .retain(|other| !self.shares_effect(other, &base.hypothesis) && !self.jumps(&other.hypothesis));
         screened
@@ -194,12 +180,9 @@ impl Search<'_> {
         /// Data sets whose noise is not the same.
         const SETS: [Range<u64>; 2] = [0..4, 4..8];
         let probe_of = |s: &Screened| s.hypothesis.parts[0].probe;
-        let spec_of = |probe: usize| self.atlas.probes[probe].spec;
+        let spec_of = |probe: usize| self.atlas().probes[probe].spec;
         let left = |further: &[Setting]| -> Option<[White; 2]> {
-            let left = |sets| {
-                self.atlas
-                    .left_beside(self.simulate, self.data, base, further, sets)
-            };
+            let left = |sets| self.trial.left_beside(base, further, sets);
             let [one, other] = SETS.map(left);
             Some([one?, other?])
         };
@@ -222,11 +205,11 @@ impl Search<'_> {
                 let constant = |s: &&Screened| probe_of(s) == probe && s.hypothesis.is_constant();
                 let constant = screened.iter().find(constant);
                 let best = constant.and_then(|constant| {
-                    let with = left(&constant.hypothesis.settings(self.atlas))?;
+                    let with = left(&constant.hypothesis.settings(self.atlas()))?;
                     let [a, b] = [0, 1].map(|i| &left_by_base[i] - &with[i]);
                     let product = 0.5 * (left_by_base[0].dot(&b) + left_by_base[1].dot(&a));
                     let (multiple, gain) = best_multiple(product, a.dot(&b));
-                    let score = self.atlas.score_of_constant(probe, gain);
+                    let score = self.atlas().score_of_constant(probe, gain);
                     Some((multiple, score - constant.score))
                 });
                 (probe, best)
@@ -237,7 +220,7 @@ impl Search<'_> {
             let (multiple, change) = (*simulated.get(&probe)?)?;
             candidate.score += change;
             if candidate.hypothesis.is_constant() {
-                candidate.hypothesis.parts[0] = candidate.hypothesis.parts[0].times(multiple, self.atlas);
+                candidate.hypothesis.parts[0] = candidate.hypothesis.parts[0].times(multiple, self.atlas());
             }
             Some(candidate)
         };
@@ -253,7 +236,7 @@ impl Search<'_> {
         for kept in &pair.hypothesis.parts {
             let alone = Hypothesis::of(kept.clone());
             if let Some(left) = self.left_by(&alone) {
-                let base = self.base(alone);
+                let base = self.trial.base(alone);
                 let others = self.beside(&base, &left, &all);
                 all.extend(others);
             }
@@ -267,12 +250,12 @@ impl Search<'_> {
         if hypothesis.parts.is_empty() {
             return Some(self.residual.clone());
         }
-        let evaluated = self.atlas.evaluate(self.simulate, hypothesis, SETS)?;
-        Some(self.atlas.white(self.data, &evaluated.expectation))
+        let evaluated = self.trial.evaluate(hypothesis, SETS)?;
+        Some(self.atlas().white(self.trial.data, &evaluated.expectation))
     }
 
     fn shares_effect(&self, screened: &Screened, start: &Hypothesis) -> bool {
-        let spec = |part: &Part| self.atlas.probes[part.probe].spec;
+        let spec = |part: &Part| self.atlas().probes[part.probe].spec;
         let own = spec(&screened.hypothesis.parts[0]);
         start.parts.iter().any(|part| spec(part) == own)
     }

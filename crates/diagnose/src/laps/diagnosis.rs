@@ -12,6 +12,7 @@ use super::ripple::Ripple;
 use super::screen::Screened;
 use super::search::{Found, STRONG, Search, candidates, of_other_effects, sort};
 use super::tests_of_fit::{FourNumbers, SIGNIFICANT_P};
+use super::trial::Trial;
 use crate::answer::{ALTERNATIVE, indistinguishable};
 use crate::{Answer, Cause, Error, Explanation, Verdict, Watch};
 
@@ -114,10 +115,13 @@ impl Atlas {
         let residual = self.white(&data, &self.null);
         let numbers = FourNumbers::new(&residual, &self.layout);
         let screened = self.screen(&residual);
-        let search = Search {
+        let trial = Trial {
             atlas: self,
             simulate,
             data: &data,
+        };
+        let search = Search {
+            trial,
             residual: &residual,
             runs,
             watch,
@@ -152,12 +156,12 @@ impl Atlas {
             && let Some(answer) = found.first_mut()
         {
             watch(&format!("the size of {}", answer.explanation.label()));
-            let look = self.look_closely(simulate, &data, &answer.hypothesis, &answer.errors);
+            let look = trial.look_closely(&answer.hypothesis, &answer.errors);
             let explanation = &mut answer.explanation;
             explanation.effects =
                 candidates(self, &look.found, &look.errors, &look.intervals, explanation.gain);
             left_out = if runs.len() > 1 {
-                self.leave_out(simulate, runs, &look)?
+                trial.leave_out(runs, &look)?
             } else {
                 vec![explanation.settings(); runs.len()]
             };
@@ -447,7 +451,12 @@ impl Atlas {
         if effects.is_empty() {
             return Ok((before, Some(before)));
         }
-        let after = self.remainder(simulate, &data, effects);
+        let trial = Trial {
+            atlas: self,
+            simulate,
+            data: &data,
+        };
+        let after = trial.remainder(effects);
         Ok((
             before,
             after.map(|residual| FourNumbers::new(&residual, &self.layout)),

@@ -3,11 +3,12 @@
 use nalgebra::{DMatrix, DVector};
 use sim::UNLISTED;
 
-use super::atlas::{Atlas, Simulate, White};
+use super::atlas::White;
 use super::hypothesis::{Hypothesis, Part};
 use super::probe::Probe;
 use super::screen::price;
 use super::steadiness::Settling;
+use super::trial::Trial;
 use crate::candidate::{WORDS, unlisted_values};
 
 /// Data sets simulated for each coefficient.
@@ -108,16 +109,16 @@ impl Probe {
     }
 }
 
-impl Atlas {
+impl Trial<'_> {
     /// The groups that explain a residual best at the sizes that linear algebra gives them: the best and those that are as
     /// good with fewer coefficients.
-    pub(super) fn screen_groups(&self, simulate: &Simulate<'_>, residual: &White) -> Vec<Hypothesis> {
+    pub(super) fn screen_groups(&self, residual: &White) -> Vec<Hypothesis> {
         const MOST: usize = 3;
-        let all: Vec<usize> = (0..self.probes.len())
-            .filter(|&probe| *self.probes[probe].spec == UNLISTED)
-            .filter(|&probe| !self.probes[probe].is_tried_apart())
+        let all: Vec<usize> = (0..self.atlas.probes.len())
+            .filter(|&probe| *self.atlas.probes[probe].spec == UNLISTED)
+            .filter(|&probe| !self.atlas.probes[probe].is_tried_apart())
             .collect();
-        let mut found = self.fitted_groups(simulate, residual, &all);
+        let mut found = self.fitted_groups(residual, &all);
         let most = found.iter().map(|f| f.0).fold(0.0, f64::max);
         // The best stand first; among those that are as good, the shorter.
         found.sort_by(|a, b| {
@@ -136,25 +137,20 @@ impl Atlas {
 
     /// A camera that looks at the floor at an angle, as far as that explains a residual, with the score that linear algebra gives
     /// it.
-    pub(super) fn screen_tilt(&self, simulate: &Simulate<'_>, residual: &White) -> Option<(f64, Hypothesis)> {
-        let tilts: Vec<usize> = (0..self.probes.len())
-            .filter(|&probe| self.probes[probe].tilts())
+    pub(super) fn screen_tilt(&self, residual: &White) -> Option<(f64, Hypothesis)> {
+        let tilts: Vec<usize> = (0..self.atlas.probes.len())
+            .filter(|&probe| self.atlas.probes[probe].tilts())
             .collect();
-        let (score, _, tilt) = self.fitted_groups(simulate, residual, &tilts).pop()?;
+        let (score, _, tilt) = self.fitted_groups(residual, &tilts).pop()?;
         Some((score, tilt))
     }
 
     /// Groups at the sizes that linear algebra gives them, each with its score and number of coefficients.
-    fn fitted_groups(
-        &self,
-        simulate: &Simulate<'_>,
-        residual: &White,
-        groups: &[usize],
-    ) -> Vec<(f64, usize, Hypothesis)> {
+    fn fitted_groups(&self, residual: &White, groups: &[usize]) -> Vec<(f64, usize, Hypothesis)> {
         let jobs: Vec<(usize, usize)> = (groups.iter())
-            .flat_map(|&probe| (0..self.probes[probe].free.len()).map(move |i| (probe, i)))
+            .flat_map(|&probe| (0..self.atlas.probes[probe].free.len()).map(move |i| (probe, i)))
             .collect();
-        let actions = self.actions(simulate, &jobs, GROUP_SETS);
+        let actions = self.actions(&jobs, GROUP_SETS);
         // A group of which a part stops the robot has no sizes.
         let fitted = |&probe: &usize| {
             let columns = (jobs.iter().zip(&actions))
@@ -163,31 +159,26 @@ impl Atlas {
                 .collect::<Option<Vec<&White>>>()?;
             let (multiples, gain) = solve(&columns, residual);
             let count = columns.len();
-            let part = Part::group(&self.probes[probe], probe, multiples.as_slice());
-            let score = gain - price(count, self.layout.total_laps());
+            let part = Part::group(&self.atlas.probes[probe], probe, multiples.as_slice());
+            let score = gain - price(count, self.atlas.layout.total_laps());
             Some((score, count, Hypothesis::of(part)))
         };
         groups.iter().filter_map(fitted).collect()
     }
 
     /// What settles like this and explains a residual best at the sizes that linear algebra gives, target by target.
-    pub(super) fn screen_settling(
-        &self,
-        simulate: &Simulate<'_>,
-        residual: &White,
-        settling: &Settling,
-    ) -> Vec<Hypothesis> {
+    pub(super) fn screen_settling(&self, residual: &White, settling: &Settling) -> Vec<Hypothesis> {
         const MOST: usize = 2;
-        let jobs: Vec<(usize, usize)> = (0..self.probes.len())
-            .filter(|&probe| self.probes[probe].settles())
+        let jobs: Vec<(usize, usize)> = (0..self.atlas.probes.len())
+            .filter(|&probe| self.atlas.probes[probe].settles())
             .map(|probe| (probe, 0))
             .collect();
-        let actions = self.actions(simulate, &jobs, GROUP_SETS);
+        let actions = self.actions(&jobs, GROUP_SETS);
         let mut found: Vec<(f64, Hypothesis)> = (jobs.iter().zip(&actions))
             .filter_map(|(&(probe, _), action)| {
                 let (end, gain) = solve(&[action.as_ref()?], residual);
                 let multiples = [end[0], settling.more * end[0]];
-                let mut part = Part::group(&self.probes[probe], probe, &multiples);
+                let mut part = Part::group(&self.atlas.probes[probe], probe, &multiples);
                 part.values[0].push(settling.time_s);
                 Some((gain, Hypothesis::of(part)))
             })

@@ -5,11 +5,11 @@ use std::ops::Range;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::atlas::{Atlas, Simulate, White};
+use super::atlas::{Atlas, White};
 use super::beside::Base;
-use super::expectation::Expectation;
 use super::hypothesis::{Hypothesis, Part};
 use super::simulated::FINAL_SETS;
+use super::trial::Trial;
 
 /// Data sets simulated at each size, at one spacing after the other.
 const CLOSER: [u64; 4] = [3, 4, 8, 8];
@@ -60,7 +60,7 @@ impl Hunt {
     }
 }
 
-/// What a probe that jumps leaves of the data at a size, by two simulations; see [`Atlas::left_beyond`].
+/// What a probe that jumps leaves of the data at a size, by two simulations; see [`Trial::left_beyond`].
 #[derive(Debug, Clone)]
 pub(super) struct Look {
     pub(super) size: f64,
@@ -79,141 +79,93 @@ impl Look {
     }
 }
 
-impl Atlas {
+impl Trial<'_> {
     /// The hypothesis and the effect beside it, at the best of sizes ever closer to that of the hunt.
-    pub(super) fn hunted(
-        &self,
-        simulate: &Simulate<'_>,
-        data: &Expectation,
-        hunt: &Hunt,
-    ) -> Option<Hypothesis> {
-        self.hunted_for(simulate, data, hunt, CLOSER.len())
+    pub(super) fn hunted(&self, hunt: &Hunt) -> Option<Hypothesis> {
+        self.hunted_for(hunt, CLOSER.len())
     }
 
     /// The same after so many looks from where the hunt began.
-    pub(super) fn hunted_for(
-        &self,
-        simulate: &Simulate<'_>,
-        data: &Expectation,
-        hunt: &Hunt,
-        looks: usize,
-    ) -> Option<Hypothesis> {
-        let part = self.hunt_closer(simulate, data, hunt.clone(), &CLOSER[hunt.looks..looks])?;
+    pub(super) fn hunted_for(&self, hunt: &Hunt, looks: usize) -> Option<Hypothesis> {
+        let part = self.hunt_closer(hunt.clone(), &CLOSER[hunt.looks..looks])?;
         Some(hunt.base.hypothesis.with(&Hypothesis::of(part)))
     }
 
     /// A hunt after one look closer.
-    pub(super) fn hunted_once(
-        &self,
-        simulate: &Simulate<'_>,
-        data: &Expectation,
-        mut hunt: Hunt,
-    ) -> Option<Hunt> {
+    pub(super) fn hunted_once(&self, mut hunt: Hunt) -> Option<Hunt> {
         let sets = CLOSER[hunt.looks];
-        self.look_closer(simulate, data, &mut hunt, sets)?;
+        self.look_closer(&mut hunt, sets)?;
         Some(hunt)
     }
 
     /// A hypothesis whose effects that jump have better sizes beside the others, whose numbers may follow but are left as they
     /// are: a further descent moves them.
-    pub(super) fn hunt_again(
-        &self,
-        simulate: &Simulate<'_>,
-        data: &Expectation,
-        hypothesis: &Hypothesis,
-        moved: Moved,
-    ) -> Option<Hypothesis> {
+    pub(super) fn hunt_again(&self, hypothesis: &Hypothesis, moved: Moved) -> Option<Hypothesis> {
         let (off, levels) = match moved {
             Moved::Far => (0.04, &CLOSER[..]),
             Moved::Little => (0.004, &CLOSER[2..]),
         };
-        self.hunt_each(simulate, data, hypothesis, levels, |hunt| {
+        self.hunt_each(hypothesis, levels, |hunt| {
             hunt.spacing = off * hunt.size;
-            hunt.base = self.base(simulate, data, hunt.base.hypothesis.clone());
+            hunt.base = self.base(hunt.base.hypothesis.clone());
         })
     }
 
     /// The same within the errors of these sizes.
-    pub(super) fn hunt_about(
-        &self,
-        simulate: &Simulate<'_>,
-        data: &Expectation,
-        hypothesis: &Hypothesis,
-    ) -> Option<Hypothesis> {
+    pub(super) fn hunt_about(&self, hypothesis: &Hypothesis) -> Option<Hypothesis> {
         const ERRORS: f64 = 1.5;
         let wider = |hunt: &mut Hunt| hunt.spacing *= ERRORS;
-        self.hunt_each(simulate, data, hypothesis, &CLOSER[..1], wider)
+        self.hunt_each(hypothesis, &CLOSER[..1], wider)
     }
 
     /// A hypothesis whose sizes that jump are those of a parabola over a wider neighbourhood, with errors of it, in units of its own
     /// scatter: how rounding falls on a reading or a speed makes likelihoods rough at a small scale, where one bottom is as good as
     /// the next.
-    pub(super) fn smoothed(
-        &self,
-        simulate: &Simulate<'_>,
-        data: &Expectation,
-        hypothesis: &Hypothesis,
-    ) -> Hypothesis {
+    pub(super) fn smoothed(&self, hypothesis: &Hypothesis) -> Hypothesis {
         let mut smooth = hypothesis.clone();
         if hypothesis.parts.iter().all(|part| part.held.is_none()) {
             return smooth;
         }
-        let own = (self.evaluate(simulate, hypothesis, self.enough(FINAL_SETS, 1)))
-            .and_then(|evaluated| self.scatter_of(evaluated.summaries.iter(), 1));
+        let own = (self.evaluate(hypothesis, self.atlas.enough(FINAL_SETS, 1)))
+            .and_then(|evaluated| self.atlas.scatter_of(evaluated.summaries.iter(), 1));
         for i in 0..smooth.parts.len() {
-            let Some(mut hunt) = self.hunt_of(&smooth, i) else {
+            let Some(mut hunt) = self.atlas.hunt_of(&smooth, i) else {
                 continue;
             };
             hunt.base = hunt.base.in_units_of(own.clone());
             let distances = |sizes: &[f64]| {
                 const SETS: u64 = 6;
-                self.distances(simulate, data, &hunt, sizes, SETS)
+                self.distances(&hunt, sizes, SETS)
             };
             if let Some((size, error)) = smooth_size(distances, hunt.size, hunt.spacing) {
-                smooth.parts[i] = Part::held(self, hunt.probe, size, error);
+                smooth.parts[i] = Part::held(self.atlas, hunt.probe, size, error);
             }
         }
         smooth
     }
 
-    /// The hunt that ended with a part of a hypothesis, as far off as its size may be; `None` of other parts.
-    fn hunt_of(&self, hypothesis: &Hypothesis, part: usize) -> Option<Hunt> {
-        let base = self.at_rest(hypothesis.without(part));
-        let part = &hypothesis.parts[part];
-        let size = part.values[0][self.probes[part.probe].size_index()];
-        Some(Hunt::new(base, part.probe, size, part.held?))
-    }
-
     fn hunt_each(
         &self,
-        simulate: &Simulate<'_>,
-        data: &Expectation,
         hypothesis: &Hypothesis,
         levels: &[u64],
         prepare: impl Fn(&mut Hunt),
     ) -> Option<Hypothesis> {
         let mut found = hypothesis.clone();
         for i in 0..found.parts.len() {
-            let Some(mut hunt) = self.hunt_of(&found, i) else {
+            let Some(mut hunt) = self.atlas.hunt_of(&found, i) else {
                 continue;
             };
             prepare(&mut hunt);
-            found.parts[i] = self.hunt_closer(simulate, data, hunt, levels)?;
+            found.parts[i] = self.hunt_closer(hunt, levels)?;
         }
         Some(found)
     }
 
     /// The best of sizes ever closer about a hunt's, with so many data sets from level to level.
-    fn hunt_closer(
-        &self,
-        simulate: &Simulate<'_>,
-        data: &Expectation,
-        mut hunt: Hunt,
-        levels: &[u64],
-    ) -> Option<Part> {
+    fn hunt_closer(&self, mut hunt: Hunt, levels: &[u64]) -> Option<Part> {
         let mut last = Vec::new();
         for &sets in levels {
-            last = self.look_closer(simulate, data, &mut hunt, sets)?;
+            last = self.look_closer(&mut hunt, sets)?;
         }
         // Sizes that are no worse than by 4 in squared distance bound the answer.
         let bound = hunt.left + 4.0;
@@ -222,21 +174,15 @@ impl Atlas {
             .filter(|found| found.0 < bound)
             .map(|found| (found.1 - hunt.size).abs());
         let error = as_good.fold(hunt.spacing / 2.0, f64::max);
-        Some(Part::held(self, hunt.probe, hunt.size, error))
+        Some(Part::held(self.atlas, hunt.probe, hunt.size, error))
     }
 
     /// Brings a hunt to the best of sizes about its own, with so many data sets at each; what these leave of the data.
-    fn look_closer(
-        &self,
-        simulate: &Simulate<'_>,
-        data: &Expectation,
-        hunt: &mut Hunt,
-        sets: u64,
-    ) -> Option<Vec<(f64, f64)>> {
+    fn look_closer(&self, hunt: &mut Hunt, sets: u64) -> Option<Vec<(f64, f64)>> {
         let sizes: Vec<f64> = (-4..=4)
             .map(|i| hunt.size + hunt.spacing * f64::from(i) / 3.0)
             .collect();
-        let found = self.distances(simulate, data, hunt, &sizes, sets);
+        let found = self.distances(hunt, &sizes, sets);
         (hunt.left, hunt.size) = least(&found)?;
         hunt.spacing /= 3.0;
         hunt.looks += 1;
@@ -244,31 +190,22 @@ impl Atlas {
     }
 
     /// Squared distances that a hunt leaves at some sizes, each with its size, by so many data sets.
-    fn distances(
-        &self,
-        simulate: &Simulate<'_>,
-        data: &Expectation,
-        hunt: &Hunt,
-        sizes: &[f64],
-        sets: u64,
-    ) -> Vec<(f64, f64)> {
-        let looks = self.looks(simulate, data, &hunt.base, hunt.probe, sizes, &[0..sets, 0..sets]);
+    fn distances(&self, hunt: &Hunt, sizes: &[f64], sets: u64) -> Vec<(f64, f64)> {
+        let looks = self.looks(&hunt.base, hunt.probe, sizes, &[0..sets, 0..sets]);
         looks.iter().map(|look| (look.square(), look.size)).collect()
     }
 
     /// What a hypothesis with a probe beside it leaves of the data at some sizes; those at which the robot crashes are left out.
     pub(super) fn looks(
         &self,
-        simulate: &Simulate<'_>,
-        data: &Expectation,
         base: &Base,
         probe: usize,
         sizes: &[f64],
         sets: &[Range<u64>; 2],
     ) -> Vec<Look> {
         let look = |&size: &f64| {
-            let further = [self.probes[probe].setting(size)];
-            let left = |i: usize| self.left_beside(simulate, data, base, &further, sets[i].clone());
+            let further = [self.atlas.probes[probe].setting(size)];
+            let left = |i: usize| self.left_beside(base, &further, sets[i].clone());
             let first = left(0)?;
             let second = if sets[0] == sets[1] {
                 first.clone()
@@ -281,6 +218,16 @@ impl Atlas {
             })
         };
         sizes.par_iter().filter_map(look).collect()
+    }
+}
+
+impl Atlas {
+    /// The hunt that ended with a part of a hypothesis, as far off as its size may be; `None` of other parts.
+    fn hunt_of(&self, hypothesis: &Hypothesis, part: usize) -> Option<Hunt> {
+        let base = self.at_rest(hypothesis.without(part));
+        let part = &hypothesis.parts[part];
+        let size = part.values[0][self.probes[part.probe].size_index()];
+        Some(Hunt::new(base, part.probe, size, part.held?))
     }
 }
 

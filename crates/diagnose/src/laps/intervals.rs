@@ -1,10 +1,9 @@
 //! Intervals of numbers of which the likelihood falls far more slowly than the parabola about its top: where no reading is cut at
 //! zero any more, or no wheel reaches a limit, a still larger size does nothing further, and laps do not bound it.
 
-use super::atlas::{Atlas, Simulate};
-use super::expectation::Expectation;
 use super::hypothesis::{Freedom, Hypothesis};
 use super::parabola::{Column, Local};
+use super::trial::Trial;
 use crate::candidate::HALF_WIDTH_95;
 
 /// The fall of the log-likelihood at the ends of a 95 % interval (Wilks 1938).
@@ -15,14 +14,12 @@ const COMPARED: f64 = 4.0;
 /// A number and its 95 % interval.
 pub(super) type Interval = (Freedom, [f64; 2]);
 
-impl Atlas {
+impl Trial<'_> {
     /// The intervals of those numbers, of a hypothesis at its top, of which the likelihood falls far more slowly than their standard
     /// errors say, to one side at least: as simulations tell with the other numbers as they are. Numbers of which the scatter of
     /// laps tells more than their means are not looked at, nor those without a range of their own.
     pub(super) fn slow_intervals(
         &self,
-        simulate: &Simulate<'_>,
-        data: &Expectation,
         top: &Hypothesis,
         errors: &[(Freedom, f64)],
         local: &Local,
@@ -30,20 +27,20 @@ impl Atlas {
         const HALF: f64 = 0.5;
         const SETS: u64 = 8;
         let misfit = |hypothesis: &Hypothesis| {
-            let simulated = self.evaluate(simulate, hypothesis, SETS)?;
-            let left = self.fit_in(data, &simulated, &local.scatter).residual;
+            let simulated = self.evaluate(hypothesis, SETS)?;
+            let left = self.fit_in(&simulated, &local.scatter).residual;
             Some(0.5 * left.norm_squared())
         };
         let Some(at_top) = misfit(top) else {
             return Vec::new();
         };
         let of = |((freedom, error), column): (&(Freedom, f64), &Column)| {
-            let (within, far) = (top.range(freedom, self)?, top.far(freedom, self)?);
+            let (within, far) = (top.range(freedom, self.atlas)?, top.far(freedom, self.atlas)?);
             if error * error * column.slope.norm_squared() < HALF {
                 return None;
             }
             let fall = |moved: f64| {
-                let there = misfit(&top.moved(self, &[(*freedom, moved)]));
+                let there = misfit(&top.moved(self.atlas, &[(*freedom, moved)]));
                 there.map_or(f64::INFINITY, |misfit| misfit - at_top)
             };
             let slow = [-1.0, 1.0].map(|side| slow_reach(|distance| fall(side * distance), *error, far));

@@ -2,13 +2,12 @@
 
 use sim::Setting;
 
-use super::atlas::{Atlas, Simulate};
-use super::expectation::Expectation;
 use super::hypothesis::{Freedom, Hypothesis};
 use super::intervals::Interval;
 use super::observed::ObservedLap;
 use super::parabola::{Column, Local, Nearest};
 use super::refine::are_within_steps;
+use super::trial::Trial;
 use crate::Error;
 
 /// A hypothesis at its most likely sizes, as parabolas over a few of their errors tell them.
@@ -33,16 +32,10 @@ const REACH: f64 = 3.0;
 /// The least share of a step to look over: a step of nothing tells nothing.
 const LEAST: f64 = 1e-3;
 
-impl Atlas {
+impl Trial<'_> {
     /// Looks closely about a hypothesis whose numbers have these errors.
-    pub(super) fn look_closely(
-        &self,
-        simulate: &Simulate<'_>,
-        data: &Expectation,
-        hypothesis: &Hypothesis,
-        errors: &[(Freedom, f64)],
-    ) -> LastLook {
-        let hypothesis = self.smoothed(simulate, data, hypothesis);
+    pub(super) fn look_closely(&self, hypothesis: &Hypothesis, errors: &[(Freedom, f64)]) -> LastLook {
+        let hypothesis = self.smoothed(hypothesis);
         let mut look = LastLook {
             found: hypothesis.clone(),
             errors: errors.to_vec(),
@@ -51,26 +44,22 @@ impl Atlas {
             freedoms: Vec::new(),
             local: None,
         };
-        let widest = hypothesis.freedoms(self);
+        let widest = hypothesis.freedoms(self.atlas);
         for _ in 0..LOOKS {
             let freedoms: Vec<Freedom> = (widest.iter().zip(&look.errors))
                 .map(|(widest, (_, error))| widest.over(REACH * error, (LEAST, 1.0)))
                 .collect();
             let points = 2 * freedoms.len() as u64 + 1;
-            let sets = self.enough(sets_at(points), points);
-            let Some(mut local) = self.local(simulate, &look.found, &freedoms, sets) else {
+            let sets = self.atlas.enough(sets_at(points), points);
+            let Some(mut local) = self.local(&look.found, &freedoms, sets) else {
                 break;
             };
             local.columns = local.columns.into_iter().map(Column::without_noise).collect();
-            let Nearest { moves, errors, .. } = self.nearest(
-                data,
-                &local.center,
-                &local.scatter,
-                &local.columns,
-                &freedoms,
-                &[],
-            );
-            let found = self.quantised(self.with_moves(&look.found, &freedoms, &moves));
+            let Nearest { moves, errors, .. } =
+                self.nearest(&local.center, &local.scatter, &local.columns, &freedoms, &[]);
+            let found = self
+                .atlas
+                .quantised(self.atlas.with_moves(&look.found, &freedoms, &moves));
             let certain = (errors.iter().zip(&freedoms))
                 .zip(&widest)
                 .all(|((error, freedom), widest)| {
@@ -90,7 +79,7 @@ impl Atlas {
             }
         }
         if let Some(local) = &look.local {
-            look.intervals = self.slow_intervals(simulate, data, &look.found, &look.errors, local);
+            look.intervals = self.slow_intervals(&look.found, &look.errors, local);
         }
         look
     }
@@ -99,36 +88,37 @@ impl Atlas {
     /// size of the run itself becomes the mean of the others'. Where the robot crashes beside the sizes, they stay.
     pub(super) fn leave_out(
         &self,
-        simulate: &Simulate<'_>,
         runs: &[Vec<ObservedLap>],
         look: &LastLook,
     ) -> Result<Vec<Vec<Setting>>, Error> {
         let fit_without = |run: usize| {
             let found = match &look.local {
-                Some(local) => self.fit_without(simulate, run, local, runs, look)?,
+                Some(local) => self.fit_without(run, local, runs, look)?,
                 None => look.found.clone(),
             };
-            Ok(found.with_mean_size(run).settings(self))
+            Ok(found.with_mean_size(run).settings(self.atlas))
         };
-        (0..self.layout.runs()).map(fit_without).collect()
+        (0..self.atlas.layout.runs()).map(fit_without).collect()
     }
 
     fn fit_without(
         &self,
-        simulate: &Simulate<'_>,
         run: usize,
         local: &Local,
         runs: &[Vec<ObservedLap>],
         look: &LastLook,
     ) -> Result<Hypothesis, Error> {
-        let (recording, place) = self.layout.places().nth(run).unwrap_or_default();
+        let (recording, place) = self.atlas.layout.places().nth(run).unwrap_or_default();
         let expected = &local.center.expectation.0[recording];
-        let of_all_runs = [self.layout.trend(recording), self.layout.second(recording)];
-        let mut silent = vec![self.layout.run(run)];
-        let mut data = self.observed(runs)?;
-        let count = self.layout.laps[recording].len();
+        let of_all_runs = [
+            self.atlas.layout.trend(recording),
+            self.atlas.layout.second(recording),
+        ];
+        let mut silent = vec![self.atlas.layout.run(run)];
+        let mut data = self.atlas.observed(runs)?;
+        let count = self.atlas.layout.laps[recording].len();
         if count > 1 {
-            data.0[recording] = self.observed_without(runs, run)?.0.remove(recording);
+            data.0[recording] = self.atlas.observed_without(runs, run)?.0.remove(recording);
         } else {
             data.0[recording].means.clear();
             silent.extend(of_all_runs.clone());
@@ -149,18 +139,12 @@ impl Atlas {
                 action.rows_mut(own.start, own.len()).fill(0.0);
             }
         }
-        let nearest = self.nearest(
-            &data,
-            &local.center,
-            &local.scatter,
-            &columns,
-            &look.freedoms,
-            &silent,
-        );
-        let found = self.with_moves(&look.about, &look.freedoms, &nearest.moves);
+        let without = Trial { data: &data, ..*self };
+        let nearest = without.nearest(&local.center, &local.scatter, &columns, &look.freedoms, &silent);
+        let found = self.atlas.with_moves(&look.about, &look.freedoms, &nearest.moves);
         // The run itself is as expected, and so has no say.
-        let hunted = self.hunt_about(simulate, &data, &found).unwrap_or(found);
-        Ok(self.quantised(hunted))
+        let hunted = without.hunt_about(&found).unwrap_or(found);
+        Ok(self.atlas.quantised(hunted))
     }
 }
 

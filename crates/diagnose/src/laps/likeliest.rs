@@ -1,12 +1,11 @@
 //! The most likely size of an effect that does little, by the likelihood itself.
 
-use super::atlas::{Atlas, Simulate};
-use super::expectation::Expectation;
 use super::hypothesis::{Freedom, Hypothesis};
 use super::likelihood::Fit;
 use super::parabola::{Local, Sides};
 use super::refine::SETTLED;
 use super::simulated::Evaluated;
+use super::trial::Trial;
 
 /// Log-likelihood by which the ends of a step may differ from its middle for a parabola through the three to tell more than one
 /// through means, and that by which it is clear with few data sets that they differ by more.
@@ -27,14 +26,12 @@ pub(super) struct Likeliest {
     pub(super) fit: Fit,
 }
 
-impl Atlas {
+impl Trial<'_> {
     /// Where the likelihood itself is highest near a hypothesis of one number; `None` of more, at the end of its range, and where its
     /// step spans so many errors that a parabola through means tells more. An effect on noise does more to the scatter than to
     /// the means, whose parabolas then are mostly noise.
     pub(super) fn likeliest(
         &self,
-        simulate: &Simulate<'_>,
-        data: &Expectation,
         hypothesis: &Hypothesis,
         freedoms: &[Freedom],
         local: &Local,
@@ -55,22 +52,21 @@ impl Atlas {
         if down == 0.0 || up == 0.0 {
             return None;
         }
-        let rough = self.fit(data, &local.center)?.gain;
+        let rough = self.fit(&local.center)?.gain;
         let far = |side: &Evaluated| {
-            self.fit(data, side)
+            self.fit(side)
                 .is_none_or(|fit| (fit.gain - rough).abs() > VERY_FAR)
         };
         if far(at_down) || far(at_up) {
             return None;
         }
         let more = |moved: f64, evaluated: &Evaluated| {
-            let there = hypothesis.moved(self, &[(*freedom, moved)]);
-            self.evaluate_more(simulate, &there, evaluated.clone(), sets)
+            let there = hypothesis.moved(self.atlas, &[(*freedom, moved)]);
+            self.evaluate_more(&there, evaluated.clone(), sets)
         };
-        let center = self.fit_with_error(data, &more(0.0, &local.center)?)?;
-        let gained = |moved: f64, evaluated: &Evaluated| {
-            Some(self.fit(data, &more(moved, evaluated)?)?.gain - center.gain)
-        };
+        let center = self.fit_with_error(&more(0.0, &local.center)?)?;
+        let gained =
+            |moved: f64, evaluated: &Evaluated| Some(self.fit(&more(moved, evaluated)?)?.gain - center.gain);
         let top = top((down, gained(down, at_down)?), (up, gained(up, at_up)?))?;
         Some(Likeliest {
             moved: freedom.possible(top.place),

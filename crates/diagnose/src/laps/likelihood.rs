@@ -4,6 +4,7 @@ use super::atlas::{Atlas, White, white};
 use super::expectation::{Expectation, Scatter};
 use super::simulated::Evaluated;
 use super::summary::Summary;
+use super::trial::Trial;
 
 /// How far the expectation of a simulated hypothesis may be off.
 #[derive(Debug, Clone, Copy)]
@@ -27,32 +28,32 @@ pub(super) struct Fit {
     pub(super) gain_error: f64,
 }
 
-impl Atlas {
+impl Trial<'_> {
     /// How well a simulated hypothesis explains the data; `None` if it was simulated too seldom to know its scatter.
-    pub(super) fn fit(&self, data: &Expectation, simulated: &Evaluated) -> Option<Fit> {
-        let scatter = self.scatter_of(simulated.summaries.iter(), 1)?;
-        Some(self.fit_in(data, simulated, &scatter))
+    pub(super) fn fit(&self, simulated: &Evaluated) -> Option<Fit> {
+        let scatter = self.atlas.scatter_of(simulated.summaries.iter(), 1)?;
+        Some(self.fit_in(simulated, &scatter))
     }
 
-    /// As [`Atlas::fit`], with an error of the gain as its data sets tell it: laps with heavy tails differ more from one to the
+    /// As [`Trial::fit`], with an error of the gain as its data sets tell it: laps with heavy tails differ more from one to the
     /// next than their covariance says.
-    pub(super) fn fit_with_error(&self, data: &Expectation, simulated: &Evaluated) -> Option<Fit> {
-        let fit = self.fit(data, simulated)?;
-        let gain_error = fit.gain_error.max(self.jackknife_error(data, simulated));
+    pub(super) fn fit_with_error(&self, simulated: &Evaluated) -> Option<Fit> {
+        let fit = self.fit(simulated)?;
+        let gain_error = fit.gain_error.max(self.jackknife_error(simulated));
         Some(Fit { gain_error, ..fit })
     }
 
     /// The standard deviation of the gain by a jackknife that leaves out a part of the data sets after the other; none if they
     /// are too few.
-    fn jackknife_error(&self, data: &Expectation, simulated: &Evaluated) -> f64 {
+    fn jackknife_error(&self, simulated: &Evaluated) -> f64 {
         const PARTS: usize = 4;
         let gain_without = |part: usize| {
             let kept = |&(set, _): &(usize, &Summary)| set % PARTS != part;
             let kept = simulated.summaries.iter().enumerate().filter(kept);
             let (sets, summaries): (Vec<usize>, Vec<Summary>) =
                 kept.map(|(set, summary)| (set, summary.clone())).unzip();
-            let declared: Vec<&Expectation> = sets.iter().map(|&set| &self.samples[set]).collect();
-            let fit = self.fit(data, &self.evaluated(summaries, &declared, simulated.doubt.alike))?;
+            let declared: Vec<&Expectation> = sets.iter().map(|&set| &self.atlas.samples[set]).collect();
+            let fit = self.fit(&self.atlas.evaluated(summaries, &declared, simulated.doubt.alike))?;
             Some(fit.gain + fit.lost_to_doubt)
         };
         let gains: Vec<f64> = (0..PARTS).filter_map(gain_without).collect();
@@ -67,29 +68,23 @@ impl Atlas {
     }
 
     /// How well a simulated hypothesis with a known scatter explains the data.
-    pub(super) fn fit_in(&self, data: &Expectation, simulated: &Evaluated, scatter: &[Scatter]) -> Fit {
-        let residual = white(scatter, &self.layout, data, &simulated.expectation);
-        self.fit_of(data, residual, scatter, simulated.doubt)
+    pub(super) fn fit_in(&self, simulated: &Evaluated, scatter: &[Scatter]) -> Fit {
+        let residual = white(scatter, &self.atlas.layout, self.data, &simulated.expectation);
+        self.fit_of(residual, scatter, simulated.doubt)
     }
 
     /// The fit that leaves a residual in units of the hypothesis' own scatter.
-    pub(super) fn fit_of(
-        &self,
-        data: &Expectation,
-        mut residual: White,
-        scatter: &[Scatter],
-        doubt: Doubt,
-    ) -> Fit {
-        let before = self.white(data, &self.null).norm_squared();
-        let (widened, doubtful) = self.allow_for(&mut residual, doubt);
+    pub(super) fn fit_of(&self, mut residual: White, scatter: &[Scatter], doubt: Doubt) -> Fit {
+        let before = self.atlas.white(self.data, &self.atlas.null).norm_squared();
+        let (widened, doubtful) = self.atlas.allow_for(&mut residual, doubt);
         let (mut wider, mut variance) = (widened, doubtful * doubt.error);
-        for (g, (own, declared)) in scatter.iter().zip(&self.scatter).enumerate() {
+        for (g, (own, declared)) in scatter.iter().zip(&self.atlas.scatter).enumerate() {
             // Every run's mean lap and the trend are each a draw of one lap's covariance.
-            let draws = (self.layout.laps[g].len() + 1) as f64;
+            let draws = (self.atlas.layout.laps[g].len() + 1) as f64;
             wider +=
                 draws * (own.log_det - declared.log_det) + own.log_det_second() - declared.log_det_second();
             // A quadratic form in an estimated covariance, and its determinant (Wishart).
-            let size = self.layout.lap as f64;
+            let size = self.atlas.layout.lap as f64;
             variance += 0.5 * draws * size * (size + draws) / own.freedom;
         }
         Fit {
@@ -99,7 +94,9 @@ impl Atlas {
             residual,
         }
     }
+}
 
+impl Atlas {
     /// Brings a residual to unit variance where the expectation is in doubt. Returns the logarithm of the determinant by which
     /// that widens the law, and the square of what lay where the doubt is.
     pub(super) fn allow_for(&self, residual: &mut White, doubt: Doubt) -> (f64, f64) {

@@ -1,35 +1,47 @@
 //! Diagnosis from laps that the camera saw.
 
-mod atlas;
-mod baseline;
-mod beside;
-mod classes;
-mod detectable;
-mod diagnosis;
+// What is measured and what is expected.
 mod expectation;
-mod groups;
-mod hunt;
-mod hypothesis;
-mod intervals;
-mod last_look;
 mod layout;
-mod likeliest;
+mod observed;
+mod summary;
+mod tests_of_fit;
+
+// The declared model, what is tried on it, and how likely that makes the data.
+mod atlas;
+mod hypothesis;
 mod likelihood;
 mod memo;
-mod observed;
-mod pairs;
-mod parabola;
 mod probe;
-mod refine;
+mod simulated;
+mod trial;
+
+// Which effects could explain the data.
+mod beside;
+mod groups;
+mod pairs;
 mod ripple;
 mod scans;
 mod screen;
-mod search;
-mod separation;
-mod simulated;
 mod steadiness;
-mod summary;
-mod tests_of_fit;
+
+// Their most likely sizes, and how well these are known.
+mod hunt;
+mod intervals;
+mod last_look;
+mod likeliest;
+mod parabola;
+mod refine;
+
+// The search through all that, and the answer.
+mod classes;
+mod diagnosis;
+mod search;
+
+// What is said beside the answer.
+mod baseline;
+mod detectable;
+mod separation;
 
 pub use atlas::{Atlas, Simulate};
 pub use baseline::Baselines;

@@ -256,7 +256,7 @@ impl Search<'_> {
         if !tried.fits() {
             let mut known = tried.starts.clone();
             for single in of_other_effects(singles.iter()).into_iter().take(BASES) {
-                let base = self.base(single.hypothesis.clone());
+                let base = self.trial.base(single.hypothesis.clone());
                 let beside = self.beside(&base, &single.left, &known);
                 known.extend(beside);
             }
@@ -308,7 +308,7 @@ impl Search<'_> {
         const HEARD: usize = 48;
         self.together.get_or_init(|| {
             self.tell(format_args!("which two effects go together"));
-            self.heard_pairs(self.atlas.screen_pairs(self.residual, HEARD))
+            self.heard_pairs(self.atlas().screen_pairs(self.residual, HEARD))
         })
     }
 
@@ -323,7 +323,7 @@ impl Search<'_> {
         const PROMISING_BESIDE: f64 = 10.0;
         let least = FAIR_SHARE * faults;
         self.tell(format_args!("what is beside {}", single.explanation.label()));
-        let base = self.base(single.hypothesis.clone());
+        let base = self.trial.base(single.hypothesis.clone());
         let mut screened = self.screened_beside(&base, &single.left);
         screened.retain(|other| !stands || other.hypothesis.is_constant());
         let enough = if stands { PROMISING_BESIDE } else { PROMISING };
@@ -383,11 +383,11 @@ impl Search<'_> {
     /// A pair after one step of Gauss and Newton's method along the paths of its probes; `None` where the robot crashes.
     fn heard_pair(&self, pair: ScreenedPair) -> Option<ScreenedPair> {
         const SETS: u64 = 4;
-        let atlas = self.atlas;
+        let atlas = self.atlas();
         let probes = [0, 1].map(|i| pair.hypothesis.parts[i].probe);
         let nothing = atlas.at_rest(Hypothesis::nothing());
         let settings = pair.hypothesis.settings(atlas);
-        let left = atlas.left_beside(self.simulate, self.data, &nothing, &settings, 0..SETS)?;
+        let left = self.trial.left_beside(&nothing, &settings, 0..SETS)?;
         let [a, b] = [0, 1].map(|i| tangent(&atlas.nodes(probes[i]), pair.sizes[i]));
         let squares = Matrix2::new(a.norm_squared(), a.dot(&b), a.dot(&b), b.norm_squared());
         let products = Vector2::new(a.dot(&left), b.dot(&left));

@@ -5,31 +5,29 @@ use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector};
 
-use super::atlas::{Atlas, Simulate, White, white};
+use super::atlas::{Atlas, White, white};
 use super::expectation::{Expectation, Scatter};
 use super::hypothesis::{Freedom, Hypothesis};
 use super::layout::Layout;
 use super::likelihood::{Doubt, Fit};
 use super::simulated::Evaluated;
+use super::trial::Trial;
 
-impl Atlas {
+impl Trial<'_> {
     /// A hypothesis and its neighbourhood, each point simulated with so many data sets; `None` where the robot crashes.
-    pub(super) fn local(
-        &self,
-        simulate: &Simulate<'_>,
-        hypothesis: &Hypothesis,
-        freedoms: &[Freedom],
-        sets: u64,
-    ) -> Option<Local> {
-        let center = self.evaluate(simulate, hypothesis, sets)?;
+    pub(super) fn local(&self, hypothesis: &Hypothesis, freedoms: &[Freedom], sets: u64) -> Option<Local> {
+        let center = self.evaluate(hypothesis, sets)?;
         let mut sides = Vec::with_capacity(freedoms.len());
         for group in groups(freedoms) {
             let at = |sign: f64| {
                 let moves: Vec<(Freedom, f64)> = group.iter().map(|f| (*f, sign * f.step)).collect();
-                let moved = hypothesis.moved(self, &moves);
+                let moved = hypothesis.moved(self.atlas, &moves);
                 Some(Point {
-                    by: group.iter().map(|f| moved.apart(hypothesis, f, self)).collect(),
-                    simulated: self.evaluate(simulate, &moved, sets)?,
+                    by: group
+                        .iter()
+                        .map(|f| moved.apart(hypothesis, f, self.atlas))
+                        .collect(),
+                    simulated: self.evaluate(&moved, sets)?,
                 })
             };
             // Where the robot crashes on one side, the other one tells the slope.
@@ -46,15 +44,17 @@ impl Atlas {
         }
         let all = (sides.iter().flat_map(|sides| [&sides.down, &sides.up]))
             .flat_map(|point| &point.simulated.summaries);
-        let scatter = self.scatter_of(center.summaries.iter().chain(all), 1 + 2 * sides.len())?;
+        let scatter = self
+            .atlas
+            .scatter_of(center.summaries.iter().chain(all), 1 + 2 * sides.len())?;
         let columns_of = |expected: &dyn Fn(&Evaluated) -> Expectation| -> Vec<Column> {
             let from = expected(&center);
             let mut columns = Vec::new();
             for Sides { group, down, up } in &sides {
-                let [at_down, at_up] =
-                    [down, up].map(|point| white(&scatter, &self.layout, &expected(&point.simulated), &from));
+                let [at_down, at_up] = [down, up]
+                    .map(|point| white(&scatter, &self.atlas.layout, &expected(&point.simulated), &from));
                 for (i, freedom) in group.iter().enumerate() {
-                    let own = |action: &White| freedom.own_share(action, &self.layout);
+                    let own = |action: &White| freedom.own_share(action, &self.atlas.layout);
                     columns.push(Column::through(
                         (down.by[i], own(&at_down)),
                         (up.by[i], own(&at_up)),
@@ -74,7 +74,7 @@ impl Atlas {
             column.doubt = (a.slope - b.slope) * (0.5 * of_all);
             column.curvature_doubt = (a.curvature - b.curvature) * (0.5 * of_all);
         }
-        let widenings = sides.iter().flat_map(|side| self.widenings(&scatter, side));
+        let widenings = sides.iter().flat_map(|side| self.atlas.widenings(&scatter, side));
         for (column, widening) in columns.iter_mut().zip(widenings) {
             column.widening = widening;
         }
@@ -85,7 +85,9 @@ impl Atlas {
             sides,
         })
     }
+}
 
+impl Atlas {
     /// What each number of a group does to the scatter of laps, as the points to either side tell it.
     fn widenings(&self, scatter: &[Scatter], sides: &Sides) -> Vec<Vec<f64>> {
         let Sides { group, down, up } = sides;
@@ -262,29 +264,28 @@ pub(super) struct Nearest {
     pub(super) hoped: f64,
 }
 
-impl Atlas {
+impl Trial<'_> {
     /// Where parabolas through a simulated hypothesis are nearest to the data, in units of a scatter that widens with its numbers: where
     /// the likelihood is highest. Entries in `silent` have no say.
     pub(super) fn nearest(
         &self,
-        data: &Expectation,
         center: &Evaluated,
         scatter: &[Scatter],
         columns: &[Column],
         freedoms: &[Freedom],
         silent: &[Range<usize>],
     ) -> Nearest {
-        let target = white(scatter, &self.layout, data, &center.expectation);
-        let laps = self.laps_of(center.doubt, silent);
+        let target = white(scatter, &self.atlas.layout, self.data, &center.expectation);
+        let laps = self.atlas.laps_of(center.doubt, silent);
         let (moves, covariance) = nearest(columns, &target, freedoms, &laps);
         let moves = DVector::from_fn(moves.len(), |i, _| freedoms[i].possible(moves[i]));
         let left = left_of(columns, &target, &moves);
         let wider = wider(columns, &moves, laps.entries.len());
         let variances = covariance.diagonal() * (1.0 + center.doubt.error);
-        let mut fit = self.fit_of(data, left.clone(), scatter, center.doubt);
+        let mut fit = self.fit_of(left.clone(), scatter, center.doubt);
         fit.gain -= 0.5 * laps.more(&left, &wider);
         for (g, wider) in wider.iter().enumerate() {
-            for range in self.layout.laps_of(g) {
+            for range in self.atlas.layout.laps_of(g) {
                 fit.residual
                     .rows_mut(range.start, range.len())
                     .scale_mut((-0.5 * wider).exp());
@@ -298,7 +299,9 @@ impl Atlas {
             covariance,
         }
     }
+}
 
+impl Atlas {
     /// The entries that tell the scatter of laps where an expectation is in doubt.
     fn laps_of(&self, doubt: Doubt, silent: &[Range<usize>]) -> Laps<'_> {
         let of_recording = |g: usize| {

@@ -4,8 +4,7 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use sim::Stage;
 
-use super::atlas::{Atlas, Simulate};
-use super::expectation::Expectation;
+use super::atlas::Atlas;
 use super::hypothesis::{Freedom, Hypothesis, Part, Shape};
 use super::likeliest::Likeliest;
 use super::likelihood::Fit;
@@ -13,6 +12,7 @@ use super::parabola::{Column, Local, Nearest};
 use super::screen::price;
 use super::simulated::Evaluated;
 use super::tests_of_fit::{FourNumbers, HOPELESS_P, SIGNIFICANT_P};
+use super::trial::Trial;
 
 /// What is simulated in a round of a descent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -160,25 +160,19 @@ impl Descent {
     }
 }
 
-impl Atlas {
+impl Trial<'_> {
     /// One round towards the best sizes; `None` where the robot then crashes.
     ///
     /// A round simulates the hypothesis at its sizes and a step to either side of each, with the same draws, takes the
     /// means for parabolas in each number, and goes to where these are nearest to the data.
-    pub(super) fn descend(
-        &self,
-        simulate: &Simulate<'_>,
-        data: &Expectation,
-        descent: Descent,
-        round: Round,
-    ) -> Option<Descent> {
+    pub(super) fn descend(&self, descent: Descent, round: Round) -> Option<Descent> {
         if descent.found {
             return Some(descent);
         }
         if descent.rests {
-            return self.weigh(simulate, data, descent, round);
+            return self.weigh(descent, round);
         }
-        let has_place = descent.hypothesis.has_place(self);
+        let has_place = descent.hypothesis.has_place(self.atlas);
         let again = match round {
             Round::Rough => false,
             // A place is not found on one parabola, nor a far one on two.
@@ -186,56 +180,44 @@ impl Atlas {
             Round::Full => !has_place && descent.knows_its_slopes(),
         };
         if again && descent.near.is_some() {
-            self.look_again(simulate, data, descent, round)
+            self.look_again(descent, round)
         } else {
-            self.look_around(simulate, data, descent, round)
+            self.look_around(descent, round)
         }
     }
 
     /// A descent that rests, simulated as often as the others of the round.
-    fn weigh(
-        &self,
-        simulate: &Simulate<'_>,
-        data: &Expectation,
-        descent: Descent,
-        round: Round,
-    ) -> Option<Descent> {
-        let center = self.evaluate(simulate, &descent.hypothesis, self.enough(round.sets(), 1))?;
-        let fit = self.fit_with_error(data, &center)?;
+    fn weigh(&self, descent: Descent, round: Round) -> Option<Descent> {
+        let center = self.evaluate(&descent.hypothesis, self.atlas.enough(round.sets(), 1))?;
+        let fit = self.fit_with_error(&center)?;
         let gain = fit.gain + fit.lost_to_doubt;
-        let score = self.score_of(&descent.hypothesis, gain);
+        let score = self.atlas.score_of(&descent.hypothesis, gain);
         let found = round == Round::Full;
         Some(Descent {
             score,
             score_error: fit.gain_error,
             progress: score - descent.score,
-            remainder: Some(FourNumbers::new(&fit.residual, &self.layout)),
+            remainder: Some(FourNumbers::new(&fit.residual, &self.atlas.layout)),
             found,
             end: found.then_some(center),
             ..descent
         })
     }
 
-    fn look_around(
-        &self,
-        simulate: &Simulate<'_>,
-        data: &Expectation,
-        descent: Descent,
-        round: Round,
-    ) -> Option<Descent> {
+    fn look_around(&self, descent: Descent, round: Round) -> Option<Descent> {
         let full = round == Round::Full;
         let points = 2 * descent.freedoms.len() as u64 + 1;
-        let sets = self.enough(round.sets_around(points), points);
-        let mut local = self.local(simulate, &descent.hypothesis, &descent.freedoms, sets)?;
+        let sets = self.atlas.enough(round.sets_around(points), points);
+        let mut local = self.local(&descent.hypothesis, &descent.freedoms, sets)?;
         let Descent {
             hypothesis, freedoms, ..
         } = &descent;
-        let sets = self.enough(round.sets_of_a_step(), 1);
-        if let Some(likeliest) = self.likeliest(simulate, data, hypothesis, freedoms, &local, sets) {
-            return Some(self.climbed(descent, &likeliest, round));
+        let sets = self.atlas.enough(round.sets_of_a_step(), 1);
+        if let Some(likeliest) = self.likeliest(hypothesis, freedoms, &local, sets) {
+            return Some(self.atlas.climbed(descent, &likeliest, round));
         }
         local.sides.clear();
-        let nearest = self.nearest(data, &local.center, &local.scatter, &local.columns, freedoms, &[]);
+        let nearest = self.nearest(&local.center, &local.scatter, &local.columns, freedoms, &[]);
         let Descent {
             hypothesis,
             mut freedoms,
@@ -250,25 +232,25 @@ impl Atlas {
                 gain_error,
                 residual,
             } = &nearest.fit;
-            let too_little = (self.least_left(&hypothesis) - residual.norm_squared()).max(0.0);
+            let too_little = (self.atlas.least_left(&hypothesis) - residual.norm_squared()).max(0.0);
             (gain + lost_to_doubt - 0.5 * too_little, *gain_error)
         } else {
-            let sets = self.enough(round.sets(), 1);
-            let center = self.evaluate_more(simulate, &hypothesis, center.clone(), sets)?;
-            self.likely_gain(data, &hypothesis, &center, nearest.hoped)?
+            let sets = self.atlas.enough(round.sets(), 1);
+            let center = self.evaluate_more(&hypothesis, center.clone(), sets)?;
+            self.likely_gain(&hypothesis, &center, nearest.hoped)?
         };
         let Nearest { moves, errors, .. } = nearest;
-        let hypothesis = self.with_moves(&hypothesis, &freedoms, &moves);
+        let hypothesis = self.atlas.with_moves(&hypothesis, &freedoms, &moves);
         let found = full && is_settled(&moves, &nearest.covariance, &freedoms);
         let holds = are_within_steps(&moves, &freedoms);
-        let remainder = full.then(|| FourNumbers::new(&nearest.fit.residual, &self.layout));
+        let remainder = full.then(|| FourNumbers::new(&nearest.fit.residual, &self.atlas.layout));
         for (i, freedom) in freedoms.iter_mut().enumerate() {
             // The parabola should hold where the answer may lie, and be wide enough for the noise of its points not to
             // pass for information.
             let reach = (10.0 * errors[i]).max(moves[i].abs());
             *freedom = freedom.over(reach, (0.2, 1.0));
         }
-        let score = self.score_of(&hypothesis, gain);
+        let score = self.atlas.score_of(&hypothesis, gain);
         Some(Descent {
             score,
             score_error,
@@ -286,6 +268,101 @@ impl Atlas {
         })
     }
 
+    fn look_again(&self, descent: Descent, round: Round) -> Option<Descent> {
+        let Descent {
+            freedoms,
+            near,
+            looks,
+            holds,
+            ..
+        } = descent;
+        let (local, moved) = near?;
+        let full = round == Round::Full;
+        let center = self.evaluate(&descent.hypothesis, self.atlas.enough(round.sets(), 1))?;
+        let columns: Vec<Column> = (local.columns.iter().zip(moved.iter()))
+            .map(|(column, moved)| column.from(*moved))
+            .collect();
+        let nearest = self.nearest(&center, &local.scatter, &columns, &freedoms, &[]);
+        let (gain, score_error) = self.likely_gain(&descent.hypothesis, &center, nearest.hoped)?;
+        let Nearest { moves, errors, .. } = nearest;
+        let found = full && is_settled(&moves, &nearest.covariance, &freedoms);
+        let remainder = Some(FourNumbers::new(&nearest.fit.residual, &self.atlas.layout));
+        let at_rest =
+            found && (moves.iter().zip(&errors)).all(|(moved, error)| moved.abs() < AT_REST * error);
+        let (hypothesis, moved, end) = if at_rest {
+            (descent.hypothesis, moved, Some(center))
+        } else {
+            let hypothesis = self.atlas.with_moves(&descent.hypothesis, &freedoms, &moves);
+            (hypothesis, moved + moves, None)
+        };
+        let score = self.atlas.score_of(&hypothesis, gain);
+        Some(Descent {
+            score,
+            score_error,
+            progress: score - descent.score,
+            remainder,
+            holds: holds && are_within_steps(&moved, &freedoms),
+            near: Some((local, moved)),
+            looks,
+            rests: false,
+            found,
+            end,
+            hypothesis,
+            freedoms,
+            errors,
+        })
+    }
+
+    /// The log-likelihood gained by a simulated hypothesis once its numbers have moved, which is hoped to gain so much more: never
+    /// so much that less would be left than chance leaves. What the simulation's own error is expected to cost is added back:
+    /// rounds simulate more or less often. Also its standard deviation for that error.
+    fn likely_gain(&self, hypothesis: &Hypothesis, simulated: &Evaluated, hoped: f64) -> Option<(f64, f64)> {
+        let fit = self.fit_with_error(simulated)?;
+        let most = 0.5 * (fit.residual.norm_squared() - self.atlas.least_left(hypothesis));
+        let gain = fit.gain + fit.lost_to_doubt + hoped.min(most.max(0.0));
+        Some((gain, fit.gain_error))
+    }
+
+    /// A hypothesis at its most likely sizes, simulated often enough to judge it; `None` where the robot crashes, and where
+    /// one of its effects came to nothing.
+    pub(super) fn settle(&self, found: &Descent) -> Option<Settled> {
+        let hypothesis = self.atlas.quantised(found.hypothesis.clone());
+        if hypothesis
+            .parts
+            .iter()
+            .any(|part| part.is_nothing(&self.atlas.probes[part.probe]))
+        {
+            return None;
+        }
+        let end = match &found.end {
+            Some(end) if hypothesis == found.hypothesis => end.clone(),
+            _ => self.evaluate(&hypothesis, self.atlas.enough(END_SETS, 1))?,
+        };
+        let fit = self.fit_with_error(&end)?;
+        Some(self.atlas.settled(hypothesis, found.errors(), fit, end))
+    }
+
+    /// Hypotheses that explain the data about as well simulated more often, and told apart by what they do to the mean:
+    /// by the scatter only as far as theirs differ by more than chance.
+    pub(super) fn settle_rivals(&self, rivals: Vec<Settled>, sets: u64) -> Vec<Settled> {
+        let (refined, evaluated): (Vec<Refined>, Vec<Evaluated>) = (rivals.into_par_iter())
+            .filter_map(|Settled { refined, evaluated }| {
+                let more = self.evaluate_more(&refined.hypothesis, evaluated, sets)?;
+                Some((refined, more))
+            })
+            .unzip();
+        let scatters = self.atlas.scatters_of(&evaluated).unwrap_or_default();
+        (refined.into_iter().zip(evaluated).zip(scatters))
+            .map(|((refined, evaluated), scatter)| {
+                let fit = self.fit_in(&evaluated, &scatter);
+                self.atlas
+                    .settled(refined.hypothesis, refined.errors, fit, evaluated)
+            })
+            .collect()
+    }
+}
+
+impl Atlas {
     /// A descent of one number moved to where the likelihood is highest about it.
     fn climbed(&self, descent: Descent, to: &Likeliest, round: Round) -> Descent {
         let full = round == Round::Full;
@@ -312,73 +389,6 @@ impl Atlas {
         }
     }
 
-    fn look_again(
-        &self,
-        simulate: &Simulate<'_>,
-        data: &Expectation,
-        descent: Descent,
-        round: Round,
-    ) -> Option<Descent> {
-        let Descent {
-            freedoms,
-            near,
-            looks,
-            holds,
-            ..
-        } = descent;
-        let (local, moved) = near?;
-        let full = round == Round::Full;
-        let center = self.evaluate(simulate, &descent.hypothesis, self.enough(round.sets(), 1))?;
-        let columns: Vec<Column> = (local.columns.iter().zip(moved.iter()))
-            .map(|(column, moved)| column.from(*moved))
-            .collect();
-        let nearest = self.nearest(data, &center, &local.scatter, &columns, &freedoms, &[]);
-        let (gain, score_error) = self.likely_gain(data, &descent.hypothesis, &center, nearest.hoped)?;
-        let Nearest { moves, errors, .. } = nearest;
-        let found = full && is_settled(&moves, &nearest.covariance, &freedoms);
-        let remainder = Some(FourNumbers::new(&nearest.fit.residual, &self.layout));
-        let at_rest =
-            found && (moves.iter().zip(&errors)).all(|(moved, error)| moved.abs() < AT_REST * error);
-        let (hypothesis, moved, end) = if at_rest {
-            (descent.hypothesis, moved, Some(center))
-        } else {
-            let hypothesis = self.with_moves(&descent.hypothesis, &freedoms, &moves);
-            (hypothesis, moved + moves, None)
-        };
-        let score = self.score_of(&hypothesis, gain);
-        Some(Descent {
-            score,
-            score_error,
-            progress: score - descent.score,
-            remainder,
-            holds: holds && are_within_steps(&moved, &freedoms),
-            near: Some((local, moved)),
-            looks,
-            rests: false,
-            found,
-            end,
-            hypothesis,
-            freedoms,
-            errors,
-        })
-    }
-
-    /// The log-likelihood gained by a simulated hypothesis once its numbers have moved, which is hoped to gain so much more: never
-    /// so much that less would be left than chance leaves. What the simulation's own error is expected to cost is added back:
-    /// rounds simulate more or less often. Also its standard deviation for that error.
-    fn likely_gain(
-        &self,
-        data: &Expectation,
-        hypothesis: &Hypothesis,
-        simulated: &Evaluated,
-        hoped: f64,
-    ) -> Option<(f64, f64)> {
-        let fit = self.fit_with_error(data, simulated)?;
-        let most = 0.5 * (fit.residual.norm_squared() - self.least_left(hypothesis));
-        let gain = fit.gain + fit.lost_to_doubt + hoped.min(most.max(0.0));
-        Some((gain, fit.gain_error))
-    }
-
     /// The least sum of squares that a hypothesis may be hoped to leave of data: what chance leaves in the luckiest case, and in
     /// the mean where sizes jump, of which parabolas promise anything.
     fn least_left(&self, hypothesis: &Hypothesis) -> f64 {
@@ -401,54 +411,6 @@ impl Atlas {
     ) -> Hypothesis {
         let by: Vec<(Freedom, f64)> = freedoms.iter().copied().zip(moves.iter().copied()).collect();
         hypothesis.moved(self, &by)
-    }
-
-    /// A hypothesis at its most likely sizes, simulated often enough to judge it; `None` where the robot crashes, and where
-    /// one of its effects came to nothing.
-    pub(super) fn settle(
-        &self,
-        simulate: &Simulate<'_>,
-        data: &Expectation,
-        found: &Descent,
-    ) -> Option<Settled> {
-        let hypothesis = self.quantised(found.hypothesis.clone());
-        if hypothesis
-            .parts
-            .iter()
-            .any(|part| part.is_nothing(&self.probes[part.probe]))
-        {
-            return None;
-        }
-        let end = match &found.end {
-            Some(end) if hypothesis == found.hypothesis => end.clone(),
-            _ => self.evaluate(simulate, &hypothesis, self.enough(END_SETS, 1))?,
-        };
-        let fit = self.fit_with_error(data, &end)?;
-        Some(self.settled(hypothesis, found.errors(), fit, end))
-    }
-
-    /// Hypotheses that explain the data about as well simulated more often, and told apart by what they do to the mean:
-    /// by the scatter only as far as theirs differ by more than chance.
-    pub(super) fn settle_rivals(
-        &self,
-        simulate: &Simulate<'_>,
-        data: &Expectation,
-        rivals: Vec<Settled>,
-        sets: u64,
-    ) -> Vec<Settled> {
-        let (refined, evaluated): (Vec<Refined>, Vec<Evaluated>) = (rivals.into_par_iter())
-            .filter_map(|Settled { refined, evaluated }| {
-                let more = self.evaluate_more(simulate, &refined.hypothesis, evaluated, sets)?;
-                Some((refined, more))
-            })
-            .unzip();
-        let scatters = self.scatters_of(&evaluated).unwrap_or_default();
-        (refined.into_iter().zip(evaluated).zip(scatters))
-            .map(|((refined, evaluated), scatter)| {
-                let fit = self.fit_in(data, &evaluated, &scatter);
-                self.settled(refined.hypothesis, refined.errors, fit, evaluated)
-            })
-            .collect()
     }
 
     fn settled(

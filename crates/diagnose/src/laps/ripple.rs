@@ -9,11 +9,12 @@ use nalgebra::DVector;
 use rayon::prelude::*;
 use statrs::statistics::{Data, OrderStatistics};
 
-use super::atlas::{Atlas, Simulate};
+use super::atlas::Atlas;
 use super::hypothesis::{Hypothesis, Part};
 use super::observed::ObservedLap;
 use super::summary::{BLOCKS, deviations, lap_vector};
 use super::tests_of_fit::Quadratic;
+use super::trial::Trial;
 
 /// Data sets simulated of what is expected.
 const SETS: u64 = 24;
@@ -68,15 +69,10 @@ fn wheel(atlas: &Atlas, probe: usize, share: f64) -> Hypothesis {
     Hypothesis::of(Part::group(of_wheel, probe, &[share / of_wheel.free[0].1]))
 }
 
-impl Atlas {
+impl Trial<'_> {
     /// The wheel whose lines measured laps have most of, beside what some effects make of them; `None` where the robot crashes.
-    pub(super) fn ripple(
-        &self,
-        simulate: &Simulate<'_>,
-        runs: &[Vec<ObservedLap>],
-        others: &Hypothesis,
-    ) -> Option<Ripple> {
-        let expected = self.spectra(simulate, others, SETS)?;
+    pub(super) fn ripple(&self, runs: &[Vec<ObservedLap>], others: &Hypothesis) -> Option<Ripple> {
+        let expected = self.spectra(others, SETS)?;
         let mean = mean(&expected);
         let missing = lines(&(spectrum(runs) - &mean));
         let scatters: Vec<DVector<f64>> = (expected.iter())
@@ -86,12 +82,12 @@ impl Atlas {
         // The mean of the simulated spectra has an error too.
         let variance_of = |squares: f64| squares / freedom * (1.0 + 1.0 / scatters.len() as f64);
         let of_each = variance_of(scatters.iter().map(DVector::norm_squared).sum()) / missing.len() as f64;
-        let probes: Vec<usize> = (0..self.probes.len())
-            .filter(|&probe| self.probes[probe].turns())
+        let probes: Vec<usize> = (0..self.atlas.probes.len())
+            .filter(|&probe| self.atlas.probes[probe].turns())
             .collect();
         let ripple = |&probe: &usize| {
-            let with = others.with(&wheel(self, probe, WHEEL_SHARE));
-            let more = self::mean(&self.spectra(simulate, &with, WHEEL_SETS)?) - &mean;
+            let with = others.with(&wheel(self.atlas, probe, WHEEL_SHARE));
+            let more = self::mean(&self.spectra(&with, WHEEL_SETS)?) - &mean;
             let direction = lines(&more).try_normalize(f64::MIN_POSITIVE)?;
             // Lines that lie side by side scatter together.
             let along = scatters
@@ -116,16 +112,11 @@ impl Atlas {
         (probes.iter().filter_map(ripple)).max_by(|a, b| a.sigmas.total_cmp(&b.sigmas))
     }
 
-    fn spectra(
-        &self,
-        simulate: &Simulate<'_>,
-        hypothesis: &Hypothesis,
-        sets: u64,
-    ) -> Option<Vec<DVector<f64>>> {
-        let settings = hypothesis.settings(self);
+    fn spectra(&self, hypothesis: &Hypothesis, sets: u64) -> Option<Vec<DVector<f64>>> {
+        let settings = hypothesis.settings(self.atlas);
         (0..sets)
             .into_par_iter()
-            .map(|set| simulate(&settings, set).map(|runs| spectrum(&runs)))
+            .map(|set| (self.simulate)(&settings, set).map(|runs| spectrum(&runs)))
             .collect()
     }
 }

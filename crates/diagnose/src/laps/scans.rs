@@ -3,14 +3,14 @@
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
-use super::atlas::{Atlas, Simulate, White};
+use super::atlas::{Atlas, White};
 use super::beside::Base;
-use super::expectation::Expectation;
 use super::hunt::{Hunt, Look};
 use super::hypothesis::{Hypothesis, Part, Shape};
 use super::pairs::{Columns, Piece};
 use super::refine::Descent;
 use super::search::{BASES, Found, ROUNDS_OF_SEVERAL, Search, near, sort};
+use super::trial::Trial;
 
 /// What a probe that jumps leaves of the data beside a base at sizes all over its range.
 #[derive(Debug, Clone)]
@@ -70,27 +70,27 @@ impl Scan {
     }
 }
 
-impl Atlas {
+impl Trial<'_> {
     /// What a probe that jumps leaves beside a base; `None` where the base crashes.
-    fn scan(&self, simulate: &Simulate<'_>, data: &Expectation, base: &Base, probe: usize) -> Option<Scan> {
+    fn scan(&self, base: &Base, probe: usize) -> Option<Scan> {
         const SETS: u64 = 3;
         const FEW: u32 = 60;
         /// Excess, in units of what chance leaves, below which noise would hide which size is best.
         const LITTLE: f64 = 3.0;
         let without = if base.hypothesis.parts.is_empty() {
-            self.null.clone()
+            self.atlas.null.clone()
         } else {
-            self.evaluate(simulate, &base.hypothesis, SETS)?.expectation
+            self.evaluate(&base.hypothesis, SETS)?.expectation
         };
-        let chance = self.layout.len() as f64;
-        let excess = self.left_beyond(data, base, &without).norm_squared() - chance;
+        let chance = self.atlas.layout.len() as f64;
+        let excess = self.left_beyond(base, &without).norm_squared() - chance;
         // Many sizes with one data set each, or fewer with two pairs of them.
         let (count, sets) = if excess < LITTLE * chance {
             (FEW, [0..2, 2..4])
         } else {
-            (self.probes[probe].scanned, [0..1, 0..1])
+            (self.atlas.probes[probe].scanned, [0..1, 0..1])
         };
-        let sizes = &self.probes[probe].sizes;
+        let sizes = &self.atlas.probes[probe].sizes;
         let (low, high) = (sizes[0], sizes[sizes.len() - 1]);
         // Sizes in a constant ratio: what matters is how many steps fit into a speed or a reading.
         let ratio = (high / low).powf(1.0 / f64::from(count - 1));
@@ -99,10 +99,12 @@ impl Atlas {
             probe,
             ratio,
             excess,
-            looks: self.looks(simulate, data, base, probe, &sizes, &sets),
+            looks: self.looks(base, probe, &sizes, &sets),
         })
     }
+}
 
+impl Atlas {
     /// The constant probes that do not jump which explain a residual best beside every scanned one, best first: of a probe that
     /// jumps few at a size and about it.
     fn screen_beside_scans(&self, residual: &White, scans: &[Scan], most: usize) -> Vec<Beside> {
@@ -169,19 +171,19 @@ impl Search<'_> {
     }
 
     fn scans(&self) -> Vec<Found> {
-        let nothing = self.atlas.at_rest(Hypothesis::nothing());
+        let nothing = self.atlas().at_rest(Hypothesis::nothing());
         let closer = |scan: &Scan| {
             self.tell(format_args!(
                 "closer sizes of {}",
-                self.atlas.probes[scan.probe].spec.name
+                self.atlas().probes[scan.probe].spec.name
             ));
             // Where a reading or a speed is so many steps, one more or one less does nearly the same.
             let closer = (scan.bottoms(&nothing, self.chance()).into_iter())
-                .filter_map(|hunt| self.atlas.hunted_once(self.simulate, self.data, hunt));
+                .filter_map(|hunt| self.trial.hunted_once(hunt));
             let hunt = Hunt::least_first(closer.collect()).into_iter().next()?;
-            let found = self.atlas.hunted(self.simulate, self.data, &hunt)?;
-            let end = Descent::start(self.atlas, &found);
-            let settled = self.atlas.settle(self.simulate, self.data, &end)?;
+            let found = self.trial.hunted(&hunt)?;
+            let end = Descent::start(self.atlas(), &found);
+            let settled = self.trial.settle(&end)?;
             Some(self.found(&settled))
         };
         self.scanned().iter().filter_map(closer).collect()
@@ -195,11 +197,11 @@ impl Search<'_> {
     /// What every effect that jumps leaves at sizes all over its range; simulated once.
     fn scanned(&self) -> &[Scan] {
         self.scanned.get_or_init(|| {
-            let nothing = self.atlas.at_rest(Hypothesis::nothing());
+            let nothing = self.atlas().at_rest(Hypothesis::nothing());
             let scan = |probe: usize| {
-                let name = self.atlas.probes[probe].spec.name;
+                let name = self.atlas().probes[probe].spec.name;
                 self.tell(format_args!("every size of {name}"));
-                self.atlas.scan(self.simulate, self.data, &nothing, probe)
+                self.trial.scan(&nothing, probe)
             };
             self.jumping().filter_map(scan).collect()
         })
@@ -209,17 +211,18 @@ impl Search<'_> {
     /// come near.
     pub(super) fn screened_pairs_that_jump(&self) -> Vec<Beside> {
         const HEARD: usize = 8;
-        (self.atlas).screen_beside_scans(self.residual, self.scanned(), HEARD)
+        self.atlas()
+            .screen_beside_scans(self.residual, self.scanned(), HEARD)
     }
 
     /// Such pairs, those that come nearest first, as far as the other's size follows.
     pub(super) fn hunts_of_pairs(&self, screened: &[Beside]) -> Vec<Hunt> {
         self.tell(format_args!("which sizes that jump go with another effect"));
         let look = |beside: &Beside| {
-            let other = Part::screened(self.atlas, beside.other, Shape::Constant, &[beside.other_size]);
-            let base = self.atlas.following(self.simulate, Hypothesis::of(other));
+            let other = Part::screened(self.atlas(), beside.other, Shape::Constant, &[beside.other_size]);
+            let base = self.trial.following(Hypothesis::of(other));
             let hunt = Hunt::new(base, beside.jumping, beside.size, beside.spacing);
-            self.atlas.hunted_once(self.simulate, self.data, hunt)
+            self.trial.hunted_once(hunt)
         };
         Hunt::least_first(screened.par_iter().filter_map(look).collect())
     }
@@ -234,7 +237,7 @@ impl Search<'_> {
         let least = hunts.first().map_or(0.0, |hunt| hunt.left);
         let bound = least + BEHIND.0.max(BEHIND.1 * (least - self.chance()));
         (hunts.iter().take(KEPT).filter(|hunt| hunt.left <= bound))
-            .filter_map(|hunt| (self.atlas).hunted_for(self.simulate, self.data, hunt, LOOKS))
+            .filter_map(|hunt| self.trial.hunted_for(hunt, LOOKS))
             .collect()
     }
 
@@ -244,7 +247,7 @@ impl Search<'_> {
         const CLOSER: usize = 2;
         let mut bases: Vec<Hypothesis> = Vec::new();
         for part in found.iter().flat_map(|found| &found.hypothesis.parts) {
-            let spec = |part: &Part| self.atlas.probes[part.probe].spec;
+            let spec = |part: &Part| self.atlas().probes[part.probe].spec;
             let constant = part.shape == Shape::Constant;
             if constant && bases.len() < BASES && bases.iter().all(|base| spec(&base.parts[0]) != spec(part))
             {
@@ -253,26 +256,26 @@ impl Search<'_> {
         }
         let mut hunts: Vec<Hunt> = Vec::new();
         for base in bases {
-            let spec = self.atlas.probes[base.parts[0].probe].spec;
-            let base = self.base(base);
+            let spec = self.atlas().probes[base.parts[0].probe].spec;
+            let base = self.trial.base(base);
             for probe in self
                 .jumping()
-                .filter(|&probe| self.atlas.probes[probe].spec != spec)
+                .filter(|&probe| self.atlas().probes[probe].spec != spec)
             {
-                let name = self.atlas.probes[probe].spec.name;
+                let name = self.atlas().probes[probe].spec.name;
                 self.tell(format_args!("every size of {name} beside {}", spec.name));
-                let scan = self.atlas.scan(self.simulate, self.data, &base, probe);
+                let scan = self.trial.scan(&base, probe);
                 hunts.extend(scan.and_then(|scan| scan.best(&base, self.chance())));
             }
         }
         let starts: Vec<Hypothesis> = (Hunt::least_first(hunts).iter().take(CLOSER))
-            .filter_map(|hunt| self.atlas.hunted(self.simulate, self.data, hunt))
+            .filter_map(|hunt| self.trial.hunted(hunt))
             .collect();
         self.settle(self.descend_several(&starts, &ROUNDS_OF_SEVERAL, near(found)))
     }
 
     fn jumping(&self) -> impl Iterator<Item = usize> {
-        (0..self.atlas.probes.len()).filter(|&probe| self.atlas.probes[probe].jumps())
+        (0..self.atlas().probes.len()).filter(|&probe| self.atlas().probes[probe].jumps())
     }
 }
 

@@ -8,9 +8,8 @@ use std::sync::OnceLock;
 
 use rayon::prelude::*;
 
-use super::atlas::{Atlas, Simulate, White};
+use super::atlas::{Atlas, White};
 use super::diagnosis::is_noise;
-use super::expectation::Expectation;
 use super::hunt::Moved;
 use super::hypothesis::{Freedom, Hypothesis, Part, Shape};
 use super::intervals::Interval;
@@ -22,6 +21,7 @@ use super::scans::Scan;
 use super::screen::Screened;
 use super::simulated::FINAL_SETS;
 use super::tests_of_fit::{FourNumbers, HOPELESS_P, Quadratic, SIGNIFICANT_P};
+use super::trial::Trial;
 use crate::{Candidate, Explanation, Watch};
 
 /// An explanation and what simulates it.
@@ -48,9 +48,7 @@ impl Found {
 
 /// A search for explanations of one data set.
 pub(super) struct Search<'a> {
-    pub(super) atlas: &'a Atlas,
-    pub(super) simulate: &'a Simulate<'a>,
-    pub(super) data: &'a Expectation,
+    pub(super) trial: Trial<'a>,
     pub(super) residual: &'a White,
     /// The laps of each run.
     pub(super) runs: &'a [Vec<ObservedLap>],
@@ -127,6 +125,12 @@ const NEAR: f64 = 50.0;
 /// Errors of a difference in log-likelihood that may be chance.
 const ERRORS: f64 = 2.0;
 
+impl<'a> Search<'a> {
+    pub(super) fn atlas(&self) -> &'a Atlas {
+        self.trial.atlas
+    }
+}
+
 impl Search<'_> {
     /// The best single effects, tried to the end, best first.
     pub(super) fn singles(&self, screened: &[Screened]) -> Vec<Found> {
@@ -144,7 +148,7 @@ impl Search<'_> {
         let mut plain: Vec<Hypothesis> = Vec::new();
         for start in starts {
             let start = start
-                .without_patterns(self.atlas)
+                .without_patterns(self.atlas())
                 .unwrap_or_else(|| start.clone());
             if !plain.iter().any(|other| other.probes() == start.probes()) {
                 plain.push(start);
@@ -166,7 +170,7 @@ impl Search<'_> {
         let Some(best) = screened.first().filter(|best| best.score < WEAK) else {
             return Vec::new();
         };
-        let probe = |s: &Screened| &self.atlas.probes[s.hypothesis.parts[0].probe];
+        let probe = |s: &Screened| &self.atlas().probes[s.hypothesis.parts[0].probe];
         let mut heard: Vec<&Screened> = Vec::new();
         for candidate in screened {
             let known = |other: &&Screened| probe(other).acts_like(probe(candidate));
@@ -178,10 +182,10 @@ impl Search<'_> {
             }
         }
         let score = |candidate: &'s Screened| {
-            let sets = self.atlas.enough(SETS, 1);
-            let simulated = (self.atlas).evaluate(self.simulate, &candidate.hypothesis, sets)?;
-            let fit = self.atlas.fit(self.data, &simulated)?;
-            Some((self.atlas.score_of(&candidate.hypothesis, fit.gain), candidate))
+            let sets = self.atlas().enough(SETS, 1);
+            let simulated = self.trial.evaluate(&candidate.hypothesis, sets)?;
+            let fit = self.trial.fit(&simulated)?;
+            Some((self.atlas().score_of(&candidate.hypothesis, fit.gain), candidate))
         };
         let mut scored: Vec<(f64, &Screened)> = heard.into_par_iter().filter_map(score).collect();
         scored.sort_by(|a, b| b.0.total_cmp(&a.0));
@@ -195,7 +199,7 @@ impl Search<'_> {
     /// Whether a hypothesis has an effect whose action jumps with its size.
     pub(super) fn jumps(&self, hypothesis: &Hypothesis) -> bool {
         let mut parts = hypothesis.parts.iter();
-        parts.any(|part| self.atlas.probes[part.probe].jumps())
+        parts.any(|part| self.atlas().probes[part.probe].jumps())
     }
 
     /// Whether an explanation has an effect that jumps at a size to which a descent led.
@@ -218,7 +222,7 @@ impl Search<'_> {
                 (Shape::ByTime, [left.trend, trend]),
             ] {
                 if left.iter().any(|left| left.p < SIGNIFICANT_P) {
-                    starts.extend(found.hypothesis.over(shape, self.atlas));
+                    starts.extend(found.hypothesis.over(shape, self.atlas()));
                 }
             }
         }
@@ -228,7 +232,7 @@ impl Search<'_> {
     /// What an explanation leaves from run to run, and of a trend, along what it does to the mean lap: one number a run, which
     /// shows what is lost among all the numbers of a lap.
     fn along_its_action(&self, found: &Found) -> [Quadratic; 2] {
-        let layout = &self.atlas.layout;
+        let layout = &self.atlas().layout;
         let action = self.residual - &found.left;
         let mut along = White::zeros(layout.lap);
         for run in (0..layout.runs()).map(|run| layout.run(run)) {
@@ -251,7 +255,7 @@ impl Search<'_> {
     pub(super) fn simpler<'f>(&self, best: impl Iterator<Item = &'f Found>) -> Vec<Found> {
         let mut starts: Vec<Hypothesis> = Vec::new();
         for found in best {
-            for start in found.hypothesis.simpler(&found.errors, self.atlas) {
+            for start in found.hypothesis.simpler(&found.errors, self.atlas()) {
                 if !starts.iter().any(|other| other.has_patterns_of(&start)) {
                     starts.push(start);
                 }
@@ -271,7 +275,7 @@ impl Search<'_> {
         for base in bases.into_iter().take(BASES).filter(|base| score(base) >= least) {
             let left = &base.left;
             self.tell(format_args!("what is beside {}", base.explanation.label()));
-            let base = self.base(base.hypothesis.clone());
+            let base = self.trial.base(base.hypothesis.clone());
             let further = self.beside(&base, left, &starts);
             starts.extend(further);
         }
@@ -288,10 +292,10 @@ impl Search<'_> {
     ) -> Vec<Descent> {
         let mut descents = self.descend(starts.iter(), rounds, reached);
         if let Some(best) = best_of(&descents) {
-            let plain = best.hypothesis.without_patterns(self.atlas).into_iter();
+            let plain = best.hypothesis.without_patterns(self.atlas()).into_iter();
             let others: Vec<Hypothesis> = plain
-                .chain(best.hypothesis.with_a_pattern_less(self.atlas))
-                .chain(best.hypothesis.with_pattern_elsewhere(self.atlas))
+                .chain(best.hypothesis.with_a_pattern_less(self.atlas()))
+                .chain(best.hypothesis.with_pattern_elsewhere(self.atlas()))
                 .collect();
             // A third effect moves the first two little: what is far behind stays there.
             let reached = if best.hypothesis.parts.len() > 2 {
@@ -313,13 +317,13 @@ impl Search<'_> {
             return Vec::new();
         };
         let probe = |s: &Screened| s.hypothesis.parts[0].probe;
-        let spec = |s: &Screened| self.atlas.probes[probe(s)].spec;
+        let spec = |s: &Screened| self.atlas().probes[probe(s)].spec;
         let mut list: Vec<&Screened> = Vec::new();
         for candidate in screened {
             if list.len() == MOST {
                 break;
             }
-            let share = if self.atlas.probes[probe(candidate)].has_place() {
+            let share = if self.atlas().probes[probe(candidate)].has_place() {
                 0.4
             } else {
                 0.7
@@ -346,14 +350,14 @@ impl Search<'_> {
     /// the best found so far tried to the end.
     pub(super) fn unnamed(&self, found: &[Found]) -> Vec<Found> {
         self.tell(format_args!("causes without a name"));
-        let starts = self.atlas.screen_groups(self.simulate, self.residual);
+        let starts = self.trial.screen_groups(self.residual);
         self.settle(self.descend(starts.iter(), &ROUNDS_OF_GROUPS, near(found)))
     }
 
     /// A camera that looks at the floor at an angle, tried to the end if it may explain more than the best found so far.
     pub(super) fn tilted(&self, found: &[Found]) -> Vec<Found> {
         let best = found.first().map_or(0.0, |best| best.explanation.score);
-        let tilt = self.atlas.screen_tilt(self.simulate, self.residual);
+        let tilt = self.trial.screen_tilt(self.residual);
         let start = tilt.filter(|(score, _)| *score > best).map(|(_, start)| start);
         self.try_rounds(start.iter(), &ROUNDS_OF_GROUPS)
     }
@@ -363,9 +367,7 @@ impl Search<'_> {
     pub(super) fn settling(&self, best: &Found) -> Vec<Found> {
         self.tell(format_args!("whether {} holds still", best.explanation.label()));
         let of_part = |part: usize| {
-            let settling = self
-                .atlas
-                .settling(self.simulate, self.runs, &best.hypothesis, part)?;
+            let settling = self.trial.settling(self.runs, &best.hypothesis, part)?;
             Some((part, settling))
         };
         let Some((part, settling)) = (0..best.hypothesis.parts.len())
@@ -379,8 +381,8 @@ impl Search<'_> {
         let Some(left) = self.left_by(&others) else {
             return Vec::new();
         };
-        let starts: Vec<Hypothesis> = (self.atlas)
-            .screen_settling(self.simulate, &left, &settling)
+        let starts: Vec<Hypothesis> = (self.trial)
+            .screen_settling(&left, &settling)
             .iter()
             .map(|start| others.with(start))
             .collect();
@@ -392,7 +394,7 @@ impl Search<'_> {
         /// Probability below which it is not.
         const NO_CHANCE_P: f64 = 1e-5;
         self.tell(format_args!("how laps ripple"));
-        let ripple = self.atlas.ripple(self.simulate, self.runs, others);
+        let ripple = self.trial.ripple(self.runs, others);
         ripple.filter(|ripple| ripple.p() < NO_CHANCE_P)
     }
 
@@ -401,13 +403,13 @@ impl Search<'_> {
         let mut others = hypothesis.clone();
         others
             .parts
-            .retain(|part| !is_noise(self.atlas.probes[part.probe].spec.name));
+            .retain(|part| !is_noise(self.atlas().probes[part.probe].spec.name));
         others
     }
 
     /// Effects with a wheel that is out of round, tried to the end.
     pub(super) fn out_of_round(&self, others: &Hypothesis, ripple: &Ripple) -> Vec<Found> {
-        let start = others.with(&ripple.hypothesis(self.atlas));
+        let start = others.with(&ripple.hypothesis(self.atlas()));
         self.try_rounds(std::iter::once(&start), &ROUNDS_OF_GROUPS)
     }
 
@@ -431,7 +433,7 @@ impl Search<'_> {
         /// Descents that go on where none seems to come to an end, or the others seem to lose.
         const FEW: usize = 3;
         let mut alive: Vec<Descent> = hypotheses
-            .map(|start| Descent::start(self.atlas, start))
+            .map(|start| Descent::start(self.atlas(), start))
             .collect();
         for &Rung { round, behind, share } in rounds {
             if alive.is_empty() {
@@ -439,7 +441,7 @@ impl Search<'_> {
             }
             self.tell(format_args!("{}", self.in_words(&alive)));
             alive = (alive.into_par_iter())
-                .filter_map(|descent| self.atlas.descend(self.simulate, self.data, descent, round))
+                .filter_map(|descent| self.trial.descend(descent, round))
                 .collect();
             alive.sort_by(|a, b| b.score.total_cmp(&a.score));
             let Some(first) = alive.first() else {
@@ -470,7 +472,8 @@ impl Search<'_> {
         const NAMED: usize = 3;
         let mut all: Vec<String> = Vec::new();
         for descent in alive {
-            let names = (descent.hypothesis.parts.iter()).map(|part| self.atlas.probes[part.probe].spec.name);
+            let names =
+                (descent.hypothesis.parts.iter()).map(|part| self.atlas().probes[part.probe].spec.name);
             let name = names.collect::<Vec<_>>().join(" + ");
             if !all.contains(&name) {
                 all.push(name);
@@ -494,7 +497,7 @@ impl Search<'_> {
     fn without_repeats<T>(&self, sorted: Vec<T>, hypothesis: fn(&T) -> &Hypothesis) -> Vec<T> {
         let mut kept: Vec<T> = Vec::new();
         for one in sorted {
-            let repeats = |better: &T| hypothesis(&one).is_near(hypothesis(better), self.atlas);
+            let repeats = |better: &T| hypothesis(&one).is_near(hypothesis(better), self.atlas());
             if !kept.iter().any(repeats) {
                 kept.push(one);
             }
@@ -505,7 +508,7 @@ impl Search<'_> {
     /// The ends of descents simulated often enough to judge them, best first.
     pub(super) fn settle(&self, descents: Vec<Descent>) -> Vec<Found> {
         let settled = (self.hunted_again(descents).par_iter())
-            .filter_map(|descent| self.atlas.settle(self.simulate, self.data, descent))
+            .filter_map(|descent| self.trial.settle(descent))
             .collect();
         let mut found: Vec<Found> = (self.closer(settled).iter())
             .map(|settled| self.found(settled))
@@ -529,7 +532,7 @@ impl Search<'_> {
             };
             let before = best_of(&descents).map_or(0.0, |best| best.score);
             self.tell(format_args!("closer sizes of what jumps"));
-            let Some(hunted) = (self.atlas).hunt_again(self.simulate, self.data, best, moved) else {
+            let Some(hunted) = self.trial.hunt_again(best, moved) else {
                 break;
             };
             let rest =
@@ -541,8 +544,8 @@ impl Search<'_> {
                     if descent.score < least {
                         return Some(descent);
                     }
-                    let start = Descent::start(self.atlas, &descent.hypothesis.with_held(&known));
-                    self.atlas.descend(self.simulate, self.data, start, Round::Full)
+                    let start = Descent::start(self.atlas(), &descent.hypothesis.with_held(&known));
+                    self.trial.descend(start, Round::Full)
                 })
                 .collect();
             let in_vain = |best: &Descent| best.leaves_far_too_much() && is_slow(best, best.score - before);
@@ -563,10 +566,9 @@ impl Search<'_> {
             best - descent.score < NEAR && parts.len() > 1 && parts.iter().any(|part| part.held.is_some())
         };
         let hunted = |rival: &Descent| {
-            let hunted =
-                (self.atlas).hunt_again(self.simulate, self.data, &rival.hypothesis, Moved::Little)?;
-            let start = Descent::start(self.atlas, &hunted);
-            self.atlas.descend(self.simulate, self.data, start, Round::Full)
+            let hunted = self.trial.hunt_again(&rival.hypothesis, Moved::Little)?;
+            let start = Descent::start(self.atlas(), &hunted);
+            self.trial.descend(start, Round::Full)
         };
         let rivals = descents.iter_mut().skip(1).filter(|rival| is_rival(rival));
         for rival in rivals.take(MOST) {
@@ -585,7 +587,8 @@ impl Search<'_> {
         /// Laps of a data set of which that many are simulated; of smaller ones more, in the same time.
         const USUAL_LAPS: u64 = 80;
         let best = (settled.iter().map(|s| s.refined.score)).fold(f64::NEG_INFINITY, f64::max);
-        let leaves = |s: &Settled| FourNumbers::new(&s.refined.fit.residual, &self.atlas.layout).omnibus_p();
+        let leaves =
+            |s: &Settled| FourNumbers::new(&s.refined.fit.residual, &self.atlas().layout).omnibus_p();
         let first = settled.iter().find(|s| s.refined.score == best);
         if first.is_some_and(|first| leaves(first) < HOPELESS_P) {
             return settled;
@@ -595,13 +598,13 @@ impl Search<'_> {
         let behind = |s: &Settled| CLOSE.max(ERRORS * best_error.hypot(error(s)));
         let (close, mut others): (Vec<_>, Vec<_>) =
             (settled.into_iter()).partition(|s| s.refined.score > best - behind(s));
-        let smaller = (USUAL_LAPS / self.atlas.layout.total_laps() as u64).max(1);
+        let smaller = (USUAL_LAPS / self.atlas().layout.total_laps() as u64).max(1);
         let sets = match close.len() as u64 {
             0 | 1 => FINAL_SETS,
             rivals => (smaller * CLOSE_SETS_OF_ALL / rivals).clamp(FINAL_SETS, smaller * CLOSE_SETS),
         };
-        let sets = self.atlas.enough(sets, 1);
-        others.extend(self.atlas.settle_rivals(self.simulate, self.data, close, sets));
+        let sets = self.atlas().enough(sets, 1);
+        others.extend(self.trial.settle_rivals(close, sets));
         others
     }
 
@@ -612,16 +615,16 @@ impl Search<'_> {
 
     /// The squared distance that chance leaves.
     pub(super) fn chance(&self) -> f64 {
-        self.atlas.layout.len() as f64
+        self.atlas().layout.len() as f64
     }
 
     pub(super) fn found(&self, settled: &Settled) -> Found {
         let Settled { refined, evaluated } = settled;
-        let atlas = self.atlas;
+        let atlas = self.atlas();
         let remainder = FourNumbers::new(&refined.fit.residual, &atlas.layout);
         Found {
             gain_error: refined.fit.gain_error,
-            left: atlas.white(self.data, &evaluated.expectation),
+            left: atlas.white(self.trial.data, &evaluated.expectation),
             residual: refined.fit.residual.clone(),
             hypothesis: refined.hypothesis.clone(),
             errors: refined.errors.clone(),

@@ -10,6 +10,7 @@ use super::expectation::Expectation;
 use super::hypothesis::Hypothesis;
 use super::likelihood::Doubt;
 use super::summary::Summary;
+use super::trial::Trial;
 
 /// Data sets simulated of a hypothesis that is judged.
 pub(super) const FINAL_SETS: u64 = 32;
@@ -41,6 +42,103 @@ impl Control {
     }
 }
 
+impl Trial<'_> {
+    /// What one step of each of these numbers of probes does, by the same draws; `None` where the robot crashes.
+    pub(super) fn actions(&self, numbers: &[(usize, usize)], sets: u64) -> Vec<Option<White>> {
+        let same_draws = self.atlas.declared_mean(0..sets);
+        numbers
+            .par_iter()
+            .map(|&(probe, number)| {
+                let setting = [self.atlas.probes[probe].step(number)];
+                let found = self.simulated_plainly(&setting, 0..sets)?;
+                Some(self.atlas.white(&found, &same_draws))
+            })
+            .collect()
+    }
+
+    /// The mean of data sets simulated with these settings, without the control variate of [`Trial::evaluate`].
+    pub(super) fn simulated_plainly(&self, settings: &[Setting], sets: Range<u64>) -> Option<Expectation> {
+        let summaries = self.atlas.summaries(self.simulate, settings, sets)?;
+        Some(Expectation::of(summaries.iter(), self.atlas.alike))
+    }
+
+    /// The same by as few of the data sets as make it as good with the control variate of [`Trial::evaluate`].
+    pub(super) fn simulated_briefly(&self, settings: &[Setting], sets: Range<u64>) -> Option<Expectation> {
+        let alike = self.atlas.are_alike(settings);
+        // How runs differ that should be alike tells what draws do, or else how data sets do.
+        let runs_tell = alike && self.atlas.layout.laps.iter().any(|laps| laps.len() > 1);
+        let fewest = if runs_tell { 1 } else { 2 };
+        let all = sets.end - sets.start;
+        if all < fewest {
+            return self.simulated_plainly(settings, sets);
+        }
+        let summaries = self
+            .atlas
+            .summaries(self.simulate, settings, sets.start..sets.start + fewest)?;
+        let first = self.atlas.paired(summaries, sets.start, alike);
+        let of_one = first.doubt.error * fewest as f64;
+        let enough = ((of_one * all as f64).round() as u64).clamp(fewest, all);
+        if enough == fewest {
+            return Some(first.expectation);
+        }
+        let mut summaries = first.summaries;
+        summaries.extend(self.atlas.summaries(
+            self.simulate,
+            settings,
+            sets.start + fewest..sets.start + enough,
+        )?);
+        Some(self.atlas.paired(summaries, sets.start, alike).expectation)
+    }
+
+    /// What effects leave of the data, in units of their own scatter; `None` where the robot crashes. That a lap is lost now and
+    /// then does not speak against effects: the data sets without it judge them.
+    pub(super) fn remainder(&self, effects: &[Setting]) -> Option<White> {
+        /// Share of the data sets that must be whole.
+        const ENOUGH: f64 = 0.75;
+        let sets = self.atlas.enough(FINAL_SETS, 1);
+        let found: Vec<(Summary, &Expectation)> = (0..sets)
+            .into_par_iter()
+            .filter_map(|set| {
+                Some((
+                    self.atlas.summary(self.simulate, effects, set)?,
+                    &self.atlas.samples[set as usize],
+                ))
+            })
+            .collect();
+        if (found.len() as f64) < ENOUGH * sets as f64 {
+            return None;
+        }
+        let (summaries, declared): (Vec<Summary>, Vec<&Expectation>) = found.into_iter().unzip();
+        let end = self
+            .atlas
+            .evaluated(summaries, &declared, self.atlas.are_alike(effects));
+        Some(self.fit(&end)?.residual)
+    }
+
+    /// A hypothesis simulated; `None` where the robot crashes.
+    pub(super) fn evaluate(&self, hypothesis: &Hypothesis, sets: u64) -> Option<Evaluated> {
+        self.atlas
+            .simulated(self.simulate, &hypothesis.settings(self.atlas), sets)
+    }
+
+    /// The same with data sets added until there are so many.
+    pub(super) fn evaluate_more(
+        &self,
+        hypothesis: &Hypothesis,
+        evaluated: Evaluated,
+        sets: u64,
+    ) -> Option<Evaluated> {
+        let mut summaries = evaluated.summaries;
+        let done = summaries.len() as u64;
+        summaries.extend(self.atlas.summaries(
+            self.simulate,
+            &hypothesis.settings(self.atlas),
+            done..sets.max(done),
+        )?);
+        Some(self.atlas.paired(summaries, 0, evaluated.doubt.alike))
+    }
+}
+
 impl Atlas {
     /// Data sets at each of so many points that determine the scatter of a lap too: short runs need more of them.
     pub(super) fn enough(&self, sets: u64, points: u64) -> u64 {
@@ -51,109 +149,6 @@ impl Atlas {
             .unwrap_or(1);
         let needed = (TIMES * self.layout.lap).div_ceil(freedom) as u64;
         sets.max(needed.div_ceil(points)).min(self.samples.len() as u64)
-    }
-
-    /// What one step of each of these numbers of probes does, by the same draws; `None` where the robot crashes.
-    pub(super) fn actions(
-        &self,
-        simulate: &Simulate<'_>,
-        numbers: &[(usize, usize)],
-        sets: u64,
-    ) -> Vec<Option<White>> {
-        let same_draws = self.declared_mean(0..sets);
-        numbers
-            .par_iter()
-            .map(|&(probe, number)| {
-                let setting = [self.probes[probe].step(number)];
-                let found = self.simulated_plainly(simulate, &setting, 0..sets)?;
-                Some(self.white(&found, &same_draws))
-            })
-            .collect()
-    }
-
-    /// The mean of data sets simulated with these settings, without the control variate of [`Atlas::evaluate`].
-    pub(super) fn simulated_plainly(
-        &self,
-        simulate: &Simulate<'_>,
-        settings: &[Setting],
-        sets: Range<u64>,
-    ) -> Option<Expectation> {
-        let summaries = self.summaries(simulate, settings, sets)?;
-        Some(Expectation::of(summaries.iter(), self.alike))
-    }
-
-    /// The same by as few of the data sets as make it as good with the control variate of [`Atlas::evaluate`].
-    pub(super) fn simulated_briefly(
-        &self,
-        simulate: &Simulate<'_>,
-        settings: &[Setting],
-        sets: Range<u64>,
-    ) -> Option<Expectation> {
-        let alike = self.are_alike(settings);
-        // How runs differ that should be alike tells what draws do, or else how data sets do.
-        let runs_tell = alike && self.layout.laps.iter().any(|laps| laps.len() > 1);
-        let fewest = if runs_tell { 1 } else { 2 };
-        let all = sets.end - sets.start;
-        if all < fewest {
-            return self.simulated_plainly(simulate, settings, sets);
-        }
-        let summaries = self.summaries(simulate, settings, sets.start..sets.start + fewest)?;
-        let first = self.paired(summaries, sets.start, alike);
-        let of_one = first.doubt.error * fewest as f64;
-        let enough = ((of_one * all as f64).round() as u64).clamp(fewest, all);
-        if enough == fewest {
-            return Some(first.expectation);
-        }
-        let mut summaries = first.summaries;
-        summaries.extend(self.summaries(simulate, settings, sets.start + fewest..sets.start + enough)?);
-        Some(self.paired(summaries, sets.start, alike).expectation)
-    }
-
-    /// What effects leave of the data, in units of their own scatter; `None` where the robot crashes. That a lap is lost now and
-    /// then does not speak against effects: the data sets without it judge them.
-    pub(super) fn remainder(
-        &self,
-        simulate: &Simulate<'_>,
-        data: &Expectation,
-        effects: &[Setting],
-    ) -> Option<White> {
-        /// Share of the data sets that must be whole.
-        const ENOUGH: f64 = 0.75;
-        let sets = self.enough(FINAL_SETS, 1);
-        let found: Vec<(Summary, &Expectation)> = (0..sets)
-            .into_par_iter()
-            .filter_map(|set| Some((self.summary(simulate, effects, set)?, &self.samples[set as usize])))
-            .collect();
-        if (found.len() as f64) < ENOUGH * sets as f64 {
-            return None;
-        }
-        let (summaries, declared): (Vec<Summary>, Vec<&Expectation>) = found.into_iter().unzip();
-        let end = self.evaluated(summaries, &declared, self.are_alike(effects));
-        Some(self.fit(data, &end)?.residual)
-    }
-
-    /// A hypothesis simulated; `None` where the robot crashes.
-    pub(super) fn evaluate(
-        &self,
-        simulate: &Simulate<'_>,
-        hypothesis: &Hypothesis,
-        sets: u64,
-    ) -> Option<Evaluated> {
-        self.simulated(simulate, &hypothesis.settings(self), sets)
-    }
-
-    /// The same with data sets added until there are so many.
-    pub(super) fn evaluate_more(
-        &self,
-        simulate: &Simulate<'_>,
-        hypothesis: &Hypothesis,
-        evaluated: Evaluated,
-        sets: u64,
-    ) -> Option<Evaluated> {
-        let mut summaries = evaluated.summaries;
-        let done = summaries.len() as u64;
-        summaries.extend(self.summaries(simulate, &hypothesis.settings(self), done..sets.max(done))?);
-        Some(self.paired(summaries, 0, evaluated.doubt.alike))
     }
 
     /// Settings simulated with so many data sets; `None` where the robot crashes.
@@ -167,6 +162,17 @@ impl Atlas {
         Some(self.paired(summaries, 0, self.are_alike(settings)))
     }
 
+    fn summaries(
+        &self,
+        simulate: &Simulate<'_>,
+        settings: &[Setting],
+        sets: Range<u64>,
+    ) -> Option<Vec<Summary>> {
+        sets.into_par_iter()
+            .map(|set| self.summary(simulate, settings, set))
+            .collect()
+    }
+
     /// Whether the declared model with these effects does the same in every run.
     fn are_alike(&self, settings: &[Setting]) -> bool {
         self.alike && settings.iter().all(Setting::same_in_every_run)
@@ -177,17 +183,6 @@ impl Atlas {
         let same_draws = self.samples.iter().skip(first as usize);
         let declared: Vec<&Expectation> = same_draws.take(summaries.len()).collect();
         self.evaluated(summaries, &declared, alike)
-    }
-
-    fn summaries(
-        &self,
-        simulate: &Simulate<'_>,
-        settings: &[Setting],
-        sets: Range<u64>,
-    ) -> Option<Vec<Summary>> {
-        sets.into_par_iter()
-            .map(|set| self.summary(simulate, settings, set))
-            .collect()
     }
 
     /// What simulated data sets say of their hypothesis. What their draws did to the declared model is taken off as far as

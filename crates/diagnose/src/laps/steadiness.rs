@@ -3,12 +3,13 @@
 use nalgebra::DVector;
 use rayon::prelude::*;
 
-use super::atlas::{Atlas, Simulate};
+use super::atlas::Atlas;
 use super::expectation::Expectation;
 use super::hypothesis::Hypothesis;
 use super::observed::ObservedLap;
 use super::summary::lap_vectors;
 use super::tests_of_fit::Quadratic;
+use super::trial::Trial;
 
 /// A size that settles while a run goes on: what it is more at first decays.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -37,36 +38,30 @@ const TIMES: [f64; 7] = [1.0, 1.4, 2.0, 2.8, 4.0, 5.7, 8.0];
 /// Runs of laps.
 type Runs = [Vec<ObservedLap>];
 
-impl Atlas {
+impl Trial<'_> {
     /// How the size of one effect of a hypothesis settles within the runs; `None` where the robot crashes.
     ///
     /// Each lap is projected, in units of a lap's scatter, on what the effect does to the mean lap of its run: a size lap by
     /// lap. What these have of a decay in time, beside a level and a change at a constant rate, is compared with what those of
     /// simulated laps have.
-    pub(super) fn settling(
-        &self,
-        simulate: &Simulate<'_>,
-        runs: &Runs,
-        hypothesis: &Hypothesis,
-        part: usize,
-    ) -> Option<Settling> {
-        let settings = hypothesis.settings(self);
-        let others = hypothesis.without(part).settings(self);
+    pub(super) fn settling(&self, runs: &Runs, hypothesis: &Hypothesis, part: usize) -> Option<Settling> {
+        let settings = hypothesis.settings(self.atlas);
+        let others = hypothesis.without(part).settings(self.atlas);
         let with: Vec<Vec<Vec<ObservedLap>>> = (0..SETS)
             .into_par_iter()
-            .map(|set| simulate(&settings, set))
+            .map(|set| (self.simulate)(&settings, set))
             .collect::<Option<_>>()?;
         let without = if others.is_empty() {
-            self.declared_mean(0..SETS)
+            self.atlas.declared_mean(0..SETS)
         } else {
-            self.simulated_briefly(simulate, &others, 0..SETS)?
+            self.simulated_briefly(&others, 0..SETS)?
         };
-        let directions = self.directions_of(&with, &without);
-        let sizes = |data: &Runs| self.sizes_along(&directions, data);
+        let directions = self.atlas.directions_of(&with, &without);
+        let sizes = |data: &Runs| self.atlas.sizes_along(&directions, data);
         let measured = sizes(runs);
         let simulated: Vec<Vec<DVector<f64>>> = with.iter().map(|data| sizes(data)).collect();
         let settling = |laps: &f64| {
-            let time_s = laps * self.lap_s();
+            let time_s = laps * self.atlas.lap_s();
             // Run by run: what is more than expected, the square that it has where it is the effect's all, and its variance.
             let of_run = |(run, laps): (usize, &Vec<ObservedLap>)| {
                 let contrast = contrast(laps, time_s);
@@ -96,7 +91,9 @@ impl Atlas {
             .map(settling)
             .max_by(|a, b| a.sigmas.abs().total_cmp(&b.sigmas.abs()))
     }
+}
 
+impl Atlas {
     /// The laps of each run of a data set projected on a direction of their own.
     fn sizes_along(&self, directions: &[DVector<f64>], data: &Runs) -> Vec<DVector<f64>> {
         let vectors = self.lap_vectors(data);

@@ -5,31 +5,42 @@
 //! under the right model its innovations are white. Each effect has columns of derivatives of the whitened
 //! innovations; linear algebra ranks the effects, and the best are refined by the log-likelihood.
 
-mod catalogue;
-mod channels;
-mod columns;
+// What is known exactly.
 mod decide;
-mod detectable;
-mod diagnosis;
 mod evidence;
+mod rows;
+mod steps;
+
+// How likely a log is.
+mod channels;
 mod filter;
+mod moments;
+
+// Which effects could explain it.
+mod catalogue;
+mod columns;
 mod groups;
 mod leads;
-mod moments;
-mod noise;
 mod pairs;
+mod screen;
+mod unnamed;
+
+// Their most likely sizes.
+mod noise;
 mod recut;
 mod refine;
 mod refined;
-mod repeat;
-mod rows;
-mod screen;
-mod search;
-mod separation;
 mod settling;
-mod steps;
-mod unnamed;
 mod wheels;
+
+// The search through all that, and the answer.
+mod diagnosis;
+mod repeat;
+mod search;
+
+// What is said beside the answer.
+mod detectable;
+mod separation;
 
 pub use channels::Channel;
 pub use decide::Decided;

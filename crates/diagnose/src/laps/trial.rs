@@ -1,0 +1,12 @@
+//! What is tried on a data set.
+
+use super::atlas::{Atlas, Simulate};
+use super::expectation::Expectation;
+
+/// The declared model, with whatever effects are added to it, simulated and held against one data set.
+#[derive(Clone, Copy)]
+pub(super) struct Trial<'a> {
+    pub(super) atlas: &'a Atlas,
+    pub(super) simulate: &'a Simulate<'a>,
+    pub(super) data: &'a Expectation,
+}
