@@ -178,6 +178,20 @@ impl Answer {
         self.claimed().map(Explanation::settings).unwrap_or_default()
     }
 
+    /// Whether laps that it was not asked for agree with it, by how they depart from the declared model and, unless the robot then
+    /// crashes, from the model with its effects: they do where they contradict nothing, or little of what they showed is left. Where
+    /// nothing is claimed there is nothing to agree with.
+    pub fn agrees_with(&self, before: &FourNumbers, after: Option<&FourNumbers>) -> bool {
+        /// Probability below which laps contradict.
+        const CONTRADICTS_P: f64 = 1e-5;
+        /// Share of the excess that may be left all the same.
+        const LITTLE: f64 = 0.2;
+        let agree = |after: &FourNumbers| {
+            after.omnibus_p() >= CONTRADICTS_P || after.excess() < LITTLE * before.excess()
+        };
+        self.verdict == Verdict::Unexplained || after.is_some_and(agree)
+    }
+
     /// Makes an answer that was found from some of the runs, `seen` among so many, one for all: a size by run is the mean of the seen
     /// runs' where none was fitted, with an error that holds how far these are apart, and runs that no fit saw have nothing to be left out.
     pub fn spread_over(&mut self, seen: &Range<usize>, runs: usize) {

@@ -34,6 +34,17 @@ pub enum Error {
         "the declared model does not complete its laps: nothing can be traced from it; look at `lapwing drive` with the same settings"
     )]
     DeclaredModelStops,
+    /// A model that hardly completes a lap.
+    #[error(
+        "the simulated robot completes laps in {completing} of {runs} runs: no error can be told; look at `lapwing drive` with the \
+         same effects"
+    )]
+    NoLaps {
+        /// Runs with a lap that passes all gates.
+        completing: usize,
+        /// Runs that were driven.
+        runs: usize,
+    },
     /// Runs that nothing can be told from.
     #[error(
         "every run needs at least three whole laps that pass all gates: measure more laps, or leave the run out"

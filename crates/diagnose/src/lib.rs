@@ -8,6 +8,7 @@ mod error;
 mod laps;
 mod least_squares;
 mod log;
+mod mean_laps;
 mod response_fit;
 
 pub use answer::{Answer, Cause, Explanation, Verdict};
@@ -19,6 +20,7 @@ pub use laps::{
     Atlas, Baselines, FourNumbers, LapDiagnosis, ObservedLap, Quadratic, Rival, Simulate, separations,
 };
 pub use log::{Channel, Decided, LogDiagnosis, LogRow, diagnose_logs, log_separation};
+pub use mean_laps::{MeanLaps, mean_lap};
 pub use response_fit::{Estimate, ResponseFit};
 
 /// Is told what is being tried, in words for a reader who waits.

@@ -1,35 +1,28 @@
 //! What laps and the robot's logs say together.
 
-use std::ops::Range;
-
-use anyhow::Result;
+use anyhow::{Context, Result};
 use diagnose::{
-    Answer, Atlas, Explanation, FourNumbers, LogDiagnosis, LogRow, ObservedLap, Simulate, Verdict, Watch,
-    diagnose_logs,
+    Answer, Atlas, Baselines, Detectable, Explanation, FourNumbers, LogDiagnosis, LogRow, ObservedLap,
+    Simulate, Verdict, Watch, diagnose_logs,
 };
 use sim::{Vec2, WheelSpeeds};
 
+use super::recording::Recording;
 use crate::dataset::{DataSet, RunFile};
 use crate::setup::Setup;
-
-/// Probability below which laps contradict what the logs say, if the answer does not explain most of it.
-const CONTRADICTS_P: f64 = 1e-5;
-/// Share of the laps' departure that an answer from logs must explain to stand.
-const CONFIRMED_SHARE: f64 = 0.8;
 
 /// An answer from logs beside what the laps make of it.
 #[derive(Debug)]
 pub(crate) struct FromLogs {
     pub(crate) logs: LogDiagnosis,
-    /// How the laps depart from the declared model, and from the model with the answer's effects.
-    pub(crate) before: FourNumbers,
+    /// How the laps depart from the model with the answer's effects; `None` where the robot crashes.
     pub(crate) after: Option<FourNumbers>,
     /// Whether the laps agree with the answer.
     pub(crate) confirmed: bool,
 }
 
 /// The rows of every run, where all runs have a log.
-pub(crate) fn log_rows(set: &DataSet) -> Option<Vec<Vec<LogRow>>> {
+fn log_rows(set: &DataSet) -> Option<Vec<Vec<LogRow>>> {
     set.runs.iter().map(rows_of).collect()
 }
 
@@ -47,33 +40,63 @@ fn rows_of(run: &RunFile) -> Option<Vec<LogRow>> {
     Some((0..run.rows.t_s.len()).map(row).collect())
 }
 
-/// The stage-wise diagnosis of the logs, then what the laps say of it; the logs are those of the runs `logged` among all, and
-/// `watch` is told what is being tried.
-pub(crate) fn from_logs(
-    setup: &Setup,
-    rows: &[Vec<LogRow>],
-    logged: Range<usize>,
-    atlas: &Atlas,
-    simulate: &Simulate<'_>,
-    laps: &[Vec<ObservedLap>],
-    watch: &Watch<'_>,
-) -> Result<FromLogs> {
-    let runs: Vec<&[LogRow]> = rows.iter().map(Vec::as_slice).collect();
-    let mut logs = diagnose_logs(&setup.model, &setup.scene, &runs, watch)?;
-    watch("whether the laps agree");
-    logs.answer.spread_over(&logged, laps.len());
-    let (before, after) = atlas.confirm(simulate, laps, &logs.answer.settings())?;
-    // Where the logs claim nothing there is nothing to agree with.
-    let confirmed = logs.answer.verdict == Verdict::Unexplained
-        || after.is_some_and(|after| {
-            after.omnibus_p() >= CONTRADICTS_P || after.excess() < (1.0 - CONFIRMED_SHARE) * before.excess()
-        });
-    Ok(FromLogs {
-        logs,
-        before,
-        after,
-        confirmed,
-    })
+/// The laps of a trace, and what simulates such.
+pub(super) struct TracedLaps<'a> {
+    pub(super) atlas: &'a Atlas,
+    pub(super) simulate: &'a Simulate<'a>,
+    pub(super) laps: &'a [Vec<ObservedLap>],
+}
+
+/// What is claimed, and why.
+pub(super) struct Named {
+    pub(super) residual: FourNumbers,
+    pub(super) answer: Answer,
+    pub(super) from_logs: Option<FromLogs>,
+    pub(super) baselines: Option<Baselines>,
+    pub(super) detectable: Vec<Detectable>,
+}
+
+impl TracedLaps<'_> {
+    /// What the laps say; `watch` is told what is being tried.
+    pub(super) fn named(&self, watch: &Watch<'_>) -> Result<Named> {
+        let found = self.atlas.diagnose(self.simulate, self.laps, watch)?;
+        Ok(Named {
+            residual: found.residual,
+            answer: found.answer,
+            from_logs: None,
+            baselines: Some(self.atlas.baselines(self.laps)?),
+            detectable: self.atlas.detectable(),
+        })
+    }
+
+    /// What the logs of a recording say, stage by stage, and what the laps make of it.
+    pub(super) fn named_by_logs(
+        &self,
+        recording: &Recording,
+        rows: &[Vec<LogRow>],
+        watch: &Watch<'_>,
+    ) -> Result<Named> {
+        let runs: Vec<&[LogRow]> = rows.iter().map(Vec::as_slice).collect();
+        let Setup { model, scene, .. } = &recording.setup;
+        let mut logs =
+            diagnose_logs(model, scene, &runs, watch).with_context(|| recording.measured.set.name.clone())?;
+        watch("whether the laps agree");
+        let logged = recording.first_run..recording.first_run + rows.len();
+        logs.answer.spread_over(&logged, self.laps.len());
+        let (before, after) = (self.atlas).confirm(self.simulate, self.laps, &logs.answer.settings())?;
+        let found = FromLogs {
+            confirmed: logs.answer.agrees_with(&before, after.as_ref()),
+            logs,
+            after,
+        };
+        Ok(Named {
+            residual: before,
+            answer: found.answer(),
+            baselines: None,
+            detectable: found.logs.detectable.clone(),
+            from_logs: Some(found),
+        })
+    }
 }
 
 impl FromLogs {
@@ -96,4 +119,10 @@ impl FromLogs {
 /// The sets of names among the explanations that the data do not tell apart, the answer's first.
 pub(crate) fn rivals(answer: &Answer) -> &[Explanation] {
     &answer.explanations[..answer.indistinguishable]
+}
+
+/// The first recording of which all runs have a log, and its logs.
+pub(super) fn with_logs(recordings: &[Recording]) -> Option<(usize, Vec<Vec<LogRow>>)> {
+    (recordings.iter().enumerate())
+        .find_map(|(place, recording)| log_rows(&recording.measured.set).map(|rows| (place, rows)))
 }

@@ -1,14 +1,14 @@
 //! A trace as a colleague would write it: sections of a report.
 
 use anyhow::Result;
-use diagnose::{Candidate, Cause, Decided, Explanation, FourNumbers, Quadratic, Verdict};
+use diagnose::{Candidate, Cause, Decided, Explanation, FourNumbers, MeanLaps, Quadratic, Verdict, mean_lap};
 use sim::Pattern;
 
 use super::answer::rivals;
 use super::document::distinct;
 use super::limits::{decide_in_words, limits, next_experiment, next_in_words, stages};
 use super::unnamed::unnamed;
-use super::{MeanLaps, Trace, mean, pictures};
+use super::{Trace, pictures};
 use crate::experiments::{Block, Picture, Section};
 use crate::figures::MM;
 use crate::laps::SampledRun;
@@ -141,8 +141,8 @@ pub(crate) fn gates_csv(trace: &Trace) -> String {
     let mut csv = String::from("data_set,gate,measured_m,before_m,after_m\n");
     for errors in &trace.errors {
         let laps: Vec<Vec<f64>> = errors.held_out.iter().flat_map(SampledRun::offsets_m).collect();
-        for (gate, measured) in mean(laps.iter()).unwrap_or_default().iter().enumerate() {
-            let (before, after) = (errors.before.mean_m[gate], errors.after.mean_m[gate]);
+        for (gate, measured) in mean_lap(&laps).unwrap_or_default().iter().enumerate() {
+            let (before, after) = (errors.before.mean_m()[gate], errors.after.mean_m()[gate]);
             let name = &trace.recordings[errors.recording].measured.set.name;
             csv += &format!("{name},{gate},{measured:.6},{before:.6},{after:.6}\n");
         }
@@ -234,7 +234,7 @@ fn error_table(trace: &Trace) -> Table {
         ]);
         let times: Vec<f64> = errors.held_out.iter().flat_map(SampledRun::lap_times_s).collect();
         let measured_s = times.iter().sum::<f64>() / times.len() as f64;
-        let off = |laps: &MeanLaps| format!("{:+.2}", laps.lap_s - measured_s);
+        let off = |laps: &MeanLaps| format!("{:+.2}", laps.lap_s() - measured_s);
         table.push([
             format!("{of}lap time, s off"),
             off(&errors.before),

@@ -1,10 +1,11 @@
 //! The pictures of a trace.
 
 use chart::{Axis, Color, Dash, Figure, Interval, Mark, Shape, Style};
+use diagnose::{MeanLaps, mean_lap};
 use track::Lap;
 
+use super::Trace;
 use super::recording::Recording;
-use super::{MeanLaps, Trace, mean};
 use crate::figures::{MM, across, colored_path, crossings, line, map, single, walls};
 use crate::laps::SampledRun;
 
@@ -16,7 +17,7 @@ fn mean_measured(recording: &Recording) -> Vec<f64> {
         .iter()
         .flat_map(SampledRun::offsets_m)
         .collect();
-    mean(laps.iter()).unwrap_or_default()
+    mean_lap(&laps).unwrap_or_default()
 }
 
 /// Where on the circuit the residual sits.
@@ -27,7 +28,7 @@ pub(super) fn residual_map(trace: &Trace) -> Figure {
     let mut points = crossings(circuit, &measured);
     let mut values: Vec<f64> = measured
         .iter()
-        .zip(&errors.before.mean_m)
+        .zip(errors.before.mean_m())
         .map(|(m, s)| MM * (m - s))
         .collect();
     points.push(points[0]);
@@ -48,7 +49,7 @@ pub(super) fn mean_laps(trace: &Trace) -> Figure {
     let declared = line(Color::VERMILLION, Dash::Dashed, 1.6);
     let answer = line(Color::BLUE, Dash::Solid, 1.6);
     let left = |laps: &MeanLaps| -> Vec<f64> {
-        let pairs = measured.iter().zip(&laps.mean_m);
+        let pairs = measured.iter().zip(laps.mean_m());
         pairs.map(|(measured, simulated)| measured - simulated).collect()
     };
     let mut below = across(&[
@@ -74,8 +75,8 @@ pub(super) fn mean_laps(trace: &Trace) -> Figure {
             measured.clone(),
             line(Color::INK, Dash::Solid, 2.0),
         ),
-        ("declared model".into(), errors.before.mean_m.clone(), declared),
-        ("with the answer".into(), errors.after.mean_m.clone(), answer),
+        ("declared model".into(), errors.before.mean_m().to_vec(), declared),
+        ("with the answer".into(), errors.after.mean_m().to_vec(), answer),
     ]);
     Figure {
         title: "Mean laps".into(),

@@ -56,11 +56,25 @@ fn in_seconds(measured: &Measured, setup: &Setup) -> Result<()> {
 }
 
 impl Recording {
-    /// A data set, checked against the model.
+    /// Data sets, checked against the model.
     ///
     /// # Errors
     /// Data of another world or controller, a run without laps, a model that cannot drive.
-    pub(super) fn new(
+    pub(super) fn all(
+        session: &Session,
+        file: &ModelFile,
+        world: Option<&Path>,
+        sets: Vec<DataSet>,
+    ) -> Result<Vec<Self>> {
+        let mut recordings: Vec<Self> = Vec::with_capacity(sets.len());
+        for set in sets {
+            let first_run = runs(&recordings).count();
+            recordings.push(Self::new(session, file, world, set, first_run)?);
+        }
+        Ok(recordings)
+    }
+
+    fn new(
         session: &Session,
         file: &ModelFile,
         world: Option<&Path>,
@@ -251,4 +265,27 @@ fn belongs(set: &DataSet, config: &Config, world: &str) -> Result<()> {
         source.label
     );
     Ok(())
+}
+
+/// Every run of all recordings.
+pub(super) fn runs(recordings: &[Recording]) -> impl Iterator<Item = &SampledRun> {
+    recordings.iter().flat_map(|recording| &recording.measured.runs)
+}
+
+/// The laps of every run of all recordings.
+///
+/// # Errors
+/// A run of which too few laps count.
+pub(super) fn observed_laps(recordings: &[Recording]) -> Result<Vec<Vec<ObservedLap>>> {
+    let laps: Vec<Vec<ObservedLap>> = recordings.iter().flat_map(Recording::laps).collect();
+    for (run, laps) in runs(recordings).zip(&laps) {
+        ensure!(
+            laps.len() >= 3,
+            "run {} has {} whole laps after its first: at least 3 in every run are needed to trace anything; leave the run \
+             out of `runs` in dataset.toml, or measure it again",
+            run.name,
+            laps.len()
+        );
+    }
+    Ok(laps)
 }

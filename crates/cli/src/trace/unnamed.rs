@@ -47,7 +47,7 @@ fn on_floor(trace: &Trace, coefficients: &[f64], label: String) -> Figure {
     let circuit = recording.setup.scene.circuit();
     let [width_m, height_m] = circuit.course.arena_m;
     let middle = Vec2::new(0.5 * width_m, 0.5 * height_m);
-    let mut points = crossings(circuit, &errors.before.mean_m);
+    let mut points = crossings(circuit, errors.before.mean_m());
     points.push(points[0]);
     let values: Vec<f64> = (points.iter())
         .map(|[x, y]| unlisted_on_floor(coefficients, Vec2::new(*x, *y) - middle))
@@ -60,7 +60,7 @@ fn curve(trace: &Trace, coefficients: &[f64], variable: &str, label: String) -> 
     let (recording, errors) = trace.shown();
     let machine = &recording.setup.model.machine;
     let laps = recording.shape().into_iter().max().unwrap_or(1);
-    let run_s = errors.before.lap_s * laps as f64;
+    let run_s = errors.before.lap_s() * laps as f64;
     let (axis, low, high) = match variable {
         "heading" => ("heading, rad", -TAU / 2.0, TAU / 2.0),
         "gate" => ("place along the lap, rad", 0.0, TAU),

@@ -1,0 +1,106 @@
+//! What the declared model leads one to expect of a recording.
+
+use anyhow::Result;
+use diagnose::{Atlas, Simulate};
+use sim::Setting;
+
+use super::cache::Cache;
+use super::recording::{Recording, Seeds};
+use crate::interrupt;
+use crate::session::Session;
+
+/// What the declared model and its other cuts simulate for one recording.
+fn with_simulations<R>(
+    recording: &Recording,
+    seed: u64,
+    use_them: impl FnOnce(&Simulate<'_>, &[&Simulate<'_>]) -> R,
+) -> R {
+    let of = |setup| {
+        move |effects: &[Setting], set: u64| {
+            recording.simulate_anywhere(setup, effects, Seeds { session: seed, set })
+        }
+    };
+    let declared = of(&recording.setup);
+    let cuts: Vec<_> = recording.cuts.iter().map(of).collect();
+    let cuts: Vec<&Simulate<'_>> = cuts.iter().map(|cut| cut as &Simulate<'_>).collect();
+    use_them(&declared, &cuts)
+}
+
+/// Laps simulated for a diagnosis; those of a cached atlas count as if they were simulated now.
+pub(super) fn laps_simulated(recordings: &[Recording], atlas: &Atlas, purpose: Purpose) -> u64 {
+    let of = |recording: &Recording| {
+        let sets = purpose.sets(recording.cuts.len());
+        (sets + atlas.spent()) * recording.shape().iter().sum::<usize>() as u64
+    };
+    recordings.iter().map(of).sum()
+}
+
+/// What an atlas is for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Purpose {
+    /// To name what laps lack.
+    Name,
+    /// To judge laps by: it knows no effect.
+    Judge,
+}
+
+impl Purpose {
+    /// Data sets simulated for it with so many other cuts of the walls.
+    fn sets(self, cuts: usize) -> u64 {
+        match self {
+            Self::Name => Atlas::sets(cuts),
+            Self::Judge => Atlas::null_sets(cuts),
+        }
+    }
+}
+
+/// The atlas of all recordings.
+pub(super) fn atlas(
+    session: &Session,
+    recordings: &[Recording],
+    purpose: Purpose,
+    cache: &Cache,
+) -> Result<Atlas> {
+    let of = |recording| atlas_of(session, recording, purpose, cache);
+    let parts = recordings.iter().map(of).collect::<Result<Vec<_>>>()?;
+    Ok(Atlas::join(parts).expect("at least one data set is measured"))
+}
+
+/// A recording's atlas, from the cache or made now.
+fn atlas_of(session: &Session, recording: &Recording, purpose: Purpose, cache: &Cache) -> Result<Atlas> {
+    let Recording { config, world, .. } = recording;
+    let shape = recording.shape();
+    let alike = recording.runs_are_alike();
+    let mut key = format!(
+        "{}\n{purpose:?}\n{}\n{world}\n{shape:?}\n{}",
+        Atlas::RECIPE,
+        config.to_toml(),
+        session.seed()
+    );
+    if !alike {
+        key += &format!("\n{:?}", recording.places(&[]));
+    }
+    if let Some(atlas) = cache.get(&key) {
+        return Ok(atlas);
+    }
+    let doing = match purpose {
+        Purpose::Name => "simulating what each effect would do",
+        Purpose::Judge => "simulating the declared model",
+    };
+    let progress = session.progress(doing, purpose.sets(recording.cuts.len()));
+    let tick = || progress.tick(1);
+    let atlas = with_simulations(recording, session.seed(), |declared, cuts| match purpose {
+        Purpose::Name => Atlas::new(declared, cuts, alike, &tick),
+        Purpose::Judge => Atlas::without_effects(declared, cuts, alike, &tick),
+    });
+    drop(progress);
+    interrupt::check()?;
+    let atlas = atlas?;
+    if let Some(folder) = cache.put(&key, &atlas).err() {
+        session.remark(&format!(
+            "{}: signatures cannot be kept here and are simulated anew next time; choose another folder with --cache",
+            folder.display()
+        ));
+    }
+    Ok(atlas)
+}

@@ -1,0 +1,53 @@
+//! What a reader must know of the data.
+
+use diagnose::LogRow;
+
+use super::recording::{Recording, runs};
+
+/// What these data do not allow; `logged` are the logs that are used, with their recording.
+pub(super) fn remarks(recordings: &[Recording], logged: Option<&(usize, Vec<Vec<LogRow>>)>) -> Vec<String> {
+    let mut remarks = Vec::new();
+    if runs(recordings).count() == 1 {
+        remarks.push(
+            "One run only: whether the robot differs from run to run cannot be told, and the error after is that of \
+             the very run that was fitted; measure a second run, or give one with --held-out."
+                .to_owned(),
+        );
+    }
+    remarks.extend(runs(recordings).flat_map(|run| run.strays.clone()));
+    for run in runs(recordings).filter(|run| run.laps.len() < run.wanted) {
+        remarks.push(format!(
+            "Run {} has {} of {} laps.",
+            run.name,
+            run.laps.len(),
+            run.wanted
+        ));
+    }
+    if let Some((place, logs)) = logged {
+        for (run, rows) in recordings[*place].measured.runs.iter().zip(logs) {
+            if !rows.iter().any(LogRow::tells) {
+                remarks.push(format!(
+                    "The log of run {} has no readings beside commands: a size that goes by run is the mean of the other \
+                     runs' there.",
+                    run.name
+                ));
+            }
+        }
+    }
+    let used = logged.map(|(place, _)| *place);
+    for (place, recording) in recordings.iter().enumerate() {
+        let set = &recording.measured.set;
+        let count = set.runs.iter().filter(|run| run.rows.log.is_some()).count();
+        if used != Some(place) && count > 0 {
+            let why = match used {
+                Some(_) => "those of another data set are used: trace this one alone to use them",
+                None => "a log in every run is needed: leave out the runs without one to use them",
+            };
+            remarks.push(format!(
+                "The logs of {} ({count} runs) are not used; {why}.",
+                set.name
+            ));
+        }
+    }
+    remarks
+}
