@@ -237,10 +237,13 @@ fn least(found: &[(f64, f64)]) -> Option<(f64, f64)> {
 }
 
 /// The least of a parabola through squared distances at ever wider spaced sizes, and its standard error, once they rise enough
-/// to either side for a parabola to tell; `None` if they never do.
+/// to either side for a parabola to tell. Where it never does so clearly, the least of the first that rise enough, as far off as
+/// the parabola's; `None` where none do.
 fn smooth_size(distances: impl Fn(&[f64]) -> Vec<(f64, f64)>, size: f64, error: f64) -> Option<(f64, f64)> {
     /// Squared distance by which both ends must rise: five standard errors.
     const RISE: f64 = 25.0;
+    /// Times by which they must rise more than distances lie off the parabola, among which chance finds a bottom, to tell clearly.
+    const ROUGH: f64 = 10.0;
     /// Share of what the sizes span to either side that the error may be.
     const TELLS: f64 = 0.5;
     /// Times by which the sizes lie wider apart from one look to the next, and looks at most.
@@ -248,6 +251,7 @@ fn smooth_size(distances: impl Fn(&[f64]) -> Vec<(f64, f64)>, size: f64, error: 
     const LOOKS: i32 = 6;
     /// Standard errors that fit into half a flat bottom.
     const FLAT: f64 = 3.0;
+    let mut unclear = None;
     for look in 0..LOOKS {
         let reach = 2.0 * error * WIDER.powi(look);
         if reach >= size {
@@ -255,23 +259,36 @@ fn smooth_size(distances: impl Fn(&[f64]) -> Vec<(f64, f64)>, size: f64, error: 
         }
         let sizes: Vec<f64> = (-4..=4).map(|i| size + reach * f64::from(i) / 4.0).collect();
         let found = distances(&sizes);
-        let (lowest, _) = least(&found)?;
-        let rises = |end: Option<&(f64, f64)>| end.is_some_and(|end| end.0 - lowest > RISE);
-        if found.len() == sizes.len() && rises(found.first()) && rises(found.last()) {
-            let told = vertex(&found, size, reach).filter(|(_, error)| *error < TELLS * reach);
-            if let Some((size, error)) = told {
-                // Distances that hardly rose at the spacing before may have a flat bottom as wide.
-                let flat = if look > 0 { reach / WIDER / FLAT } else { 0.0 };
-                return Some((size, error.max(flat)));
+        let (lowest, bottom) = least(&found)?;
+        if found.len() < sizes.len() {
+            continue;
+        }
+        let rise = found[0].0.min(found[found.len() - 1].0) - lowest;
+        let tells = |vertex: &Vertex| rise > RISE && vertex.error < TELLS * reach;
+        if let Some(vertex) = vertex(&found, size, reach).filter(tells) {
+            // Distances that hardly rose at the spacing before may have a flat bottom as wide.
+            let flat = if look > 0 { reach / WIDER / FLAT } else { 0.0 };
+            let error = vertex.error.max(flat);
+            if rise > ROUGH * vertex.roughness {
+                return Some((vertex.size, error));
             }
+            unclear = unclear.or(Some((bottom, error.max((bottom - vertex.size).abs()))));
         }
     }
-    None
+    unclear
 }
 
-/// The vertex of the parabola nearest to squared distances at sizes about a middle, and its standard error: that of the
-/// likelihood and that for how far the distances lie from the parabola.
-fn vertex(found: &[(f64, f64)], middle: f64, reach: f64) -> Option<(f64, f64)> {
+/// The vertex of a parabola through squared distances.
+struct Vertex {
+    size: f64,
+    /// Standard error: of the likelihood, and for how far the distances lie off the parabola.
+    error: f64,
+    /// How far they do: the root of their mean square.
+    roughness: f64,
+}
+
+/// The vertex of the parabola nearest to squared distances at sizes about a middle; `None` where it bends down.
+fn vertex(found: &[(f64, f64)], middle: f64, reach: f64) -> Option<Vertex> {
     let x = |(_, size): &(f64, f64)| (size - middle) / reach;
     let design = DMatrix::from_fn(found.len(), 3, |i, power| x(&found[i]).powi(power as i32));
     let heights = DVector::from_iterator(found.len(), found.iter().map(|found| found.0));
@@ -284,7 +301,11 @@ fn vertex(found: &[(f64, f64)], middle: f64, reach: f64) -> Option<(f64, f64)> {
     let off = (heights - &design * &fit).norm_squared() / (found.len() as f64 - 3.0);
     let rough = off * covariance[(1, 1)] / (2.0 * bend).powi(2);
     let vertex = (-slope / (2.0 * bend)).clamp(-1.0, 1.0);
-    Some((middle + reach * vertex, reach * (1.0 / bend + rough).sqrt()))
+    Some(Vertex {
+        size: middle + reach * vertex,
+        error: reach * (1.0 / bend + rough).sqrt(),
+        roughness: off.sqrt(),
+    })
 }
 
 #[cfg(test)]
@@ -303,6 +324,29 @@ mod tests {
             (size - 30.0).abs() < 2.0 * error && (0.45..0.7).contains(&error),
             "{size} {error}"
         );
+    }
+
+    #[test]
+    fn a_bottom_of_chance_is_passed_over() {
+        let mut stream = sim::Streams { seed: 2, run: 0 }.open("rough");
+        let mut errors = Vec::new();
+        for _ in 0..50 {
+            let mut at = |size: f64| ((size - 30.0) / 0.03).powi(2) + 12.0 * stream.normal();
+            // Wherever a hunt ended: the least of many distances near the least of the parabola.
+            let near = (-20..=20).map(|i| 30.0 + 1e-3 * f64::from(i));
+            let bottom = near.min_by(|a, b| at(*a).total_cmp(&at(*b))).unwrap();
+            let at = std::cell::RefCell::new(at);
+            let rough = |sizes: &[f64]| -> Vec<(f64, f64)> {
+                sizes
+                    .iter()
+                    .map(|&size| ((at.borrow_mut())(size), size))
+                    .collect()
+            };
+            let (size, error) = smooth_size(rough, bottom, 1e-3).unwrap();
+            errors.push((size - 30.0).abs() / error);
+        }
+        let within = errors.iter().filter(|error| **error < 1.96).count();
+        assert!(within >= 45, "{errors:?}");
     }
 
     #[test]
