@@ -263,7 +263,7 @@ impl Search<'_> {
 
 /// The multiple of an action that explains most, by its product with what is to be explained and its square, and half the squared
 /// distance that it gains. It is not more than twice as much as was simulated.
-fn best_multiple(product: f64, square: f64) -> (f64, f64) {
+pub(super) fn best_multiple(product: f64, square: f64) -> (f64, f64) {
     const MOST: f64 = 2.0;
     let multiple = (product / square.max(f64::MIN_POSITIVE)).clamp(0.0, MOST);
     (multiple, multiple * product - 0.5 * multiple * multiple * square)

@@ -22,6 +22,8 @@ pub(super) const ALARM_SCORE: f64 = 7.0;
 const ALARM_P: f64 = 0.002;
 /// Probability of what is left below which something is left that is worth a search, however small a share it is.
 const SURELY_P: f64 = 1e-6;
+/// Probability of what is left from which on it may still be chance.
+const HARDLY_P: f64 = 1e-4;
 /// Share of the excess that an explanation must explain to stand in spite of a significant remainder.
 const ENOUGH: f64 = 0.98;
 /// The same for several effects, which have more freedom to be wrong.
@@ -272,7 +274,23 @@ fn explain(search: &Search<'_>, mut found: Vec<Found>) -> Vec<Found> {
         let unnamed = search.unnamed(&found);
         found = unless_named(found, unnamed);
     }
-    held_still(search, simplified(search, found))
+    held_still(search, with_others_there(search, simplified(search, found)))
+}
+
+/// Explanations with those of other effects at the places on walls of the first one's effects, in their order.
+fn with_others_there(search: &Search<'_>, mut found: Vec<Found>) -> Vec<Found> {
+    let Some(best) = found.first().filter(|best| is_claimed(&best.explanation)) else {
+        return found;
+    };
+    for other in search.at_same_place(best) {
+        let comes_before = |one: &Found| {
+            one.explanation.score < other.explanation.score
+                || one.explanation.effects.len() != other.explanation.effects.len()
+        };
+        let place = found.iter().position(comes_before).unwrap_or(found.len());
+        found.insert(place, other);
+    }
+    found
 }
 
 /// Explanations of which the first, if it claims several effects, needs each of them and each of their patterns: an effect that may do
@@ -299,12 +317,16 @@ fn simplified(search: &Search<'_>, found: Vec<Found>) -> Vec<Found> {
 
 /// Explanations of which the first, if a name is claimed, holds still within the runs: else what was seen to settle comes first.
 fn held_still(search: &Search<'_>, found: Vec<Found>) -> Vec<Found> {
-    let claimed = |best: &Explanation| verdict_of(best) != Verdict::Unexplained && !best.has_no_name();
-    if let Some(best) = found.first().filter(|best| claimed(&best.explanation)) {
+    if let Some(best) = found.first().filter(|best| is_claimed(&best.explanation)) {
         let settling = search.settling(best);
         return unless_steady(found, settling);
     }
     found
+}
+
+/// Whether names are claimed.
+fn is_claimed(best: &Explanation) -> bool {
+    verdict_of(best) != Verdict::Unexplained && !best.has_no_name()
 }
 
 /// Whether an explanation has a size by run or by time, which may follow what a further effect does.
@@ -332,9 +354,11 @@ fn verdict_of(best: &Explanation) -> Verdict {
             Verdict::Explained
         };
     }
+    // Laps have heavier tails than their covariance says.
+    let may_be_chance = leaves_more_likely_than(best, HARDLY_P);
     let enough = match best.effects.len() {
         _ if best.has_no_name() => MOST,
-        _ if best.score <= STRONG => return Verdict::Unexplained,
+        _ if best.score <= STRONG && !may_be_chance => return Verdict::Unexplained,
         1 => ENOUGH,
         _ => MOST,
     };

@@ -135,6 +135,42 @@ impl Part {
         }
     }
 
+    /// The other effects that act at a place of a wall at this one's, to either side of nothing; none of what has no place.
+    pub(super) fn at_same_place(&self, atlas: &Atlas) -> Vec<Self> {
+        let own = &atlas.probes[self.probe];
+        let place = |probe: &Probe, values: &[f64]| -> Option<[f64; 3]> {
+            let value =
+                |name: &str| Some(values[probe.spec.params.iter().position(|param| param.name == name)?]);
+            Some([value("wall")?, value("position")?, value("length_m")?])
+        };
+        let Some([wall, position, length_m]) = place(own, &self.values[0]) else {
+            return Vec::new();
+        };
+        let others = (atlas.probes.iter().enumerate()).filter(|(_, other)| other.spec != own.spec);
+        let off = |other: &Probe| {
+            let [on, at, _] = place(other, other.origin())?;
+            (on == wall).then_some((at - position).abs())
+        };
+        let nearest = others.filter_map(|(number, other)| Some((off(other)?, number, other)));
+        let Some((_, number, other)) = nearest.min_by(|a, b| a.0.total_cmp(&b.0)) else {
+            return Vec::new();
+        };
+        let at_size = |size: &f64| {
+            [*size, 2.0 * other.neutral - size].map(|size| {
+                let mut part = Self::screened(atlas, number, Shape::Constant, &[size]);
+                for (param, value) in other.spec.params.iter().zip(&mut part.values[0]) {
+                    match param.name {
+                        "position" => *value = position,
+                        "length_m" => *value = length_m,
+                        _ => {}
+                    }
+                }
+                part
+            })
+        };
+        other.sizes.iter().flat_map(at_size).collect()
+    }
+
     /// A group of basis functions at multiples of its steps.
     pub(super) fn group(probe: &Probe, number: usize, multiples: &[f64]) -> Self {
         let mut values = probe.origin().to_vec();

@@ -7,7 +7,7 @@ use super::atlas::{Atlas, White};
 use super::hunt::Hunt;
 use super::hypothesis::{Hypothesis, Part, Shape};
 use super::refine::Descent;
-use super::screen::{BEYOND, price, tangent};
+use super::screen::{BEYOND, Screened, price, tangent};
 use super::search::{
     BASES, Found, ROUNDS_BESIDE, ROUNDS_OF_SEVERAL, Rung, STRONG, Search, best_of, of_other_effects,
 };
@@ -322,19 +322,30 @@ impl Search<'_> {
         const PROMISING: f64 = 5.0;
         const PROMISING_BESIDE: f64 = 10.0;
         let least = FAIR_SHARE * faults;
+        let mut tried = Tried::new(&ROUNDS_BESIDE, single.explanation.score);
+        if !stands && !single.fits() {
+            self.descend_on(&mut tried, self.pairs_about(single));
+        }
+        if tried.fits() {
+            return self.with_exchanged(tried);
+        }
         self.tell(format_args!("what is beside {}", single.explanation.label()));
         let base = self.trial.base(single.hypothesis.clone());
         let mut screened = self.screened_beside(&base, &single.left);
         screened.retain(|other| !stands || other.hypothesis.is_constant());
         let enough = if stands { PROMISING_BESIDE } else { PROMISING };
-        if screened.first().is_none_or(|best| best.score < enough.max(least)) {
-            return Vec::new();
+        let promises = |screened: &[Screened], enough: f64| {
+            screened
+                .first()
+                .is_some_and(|best| best.score >= enough.max(least))
+        };
+        if !promises(&screened, enough) {
+            return self.with_exchanged(tried);
         }
         let heard = self.heard_beside(&base, screened);
-        if heard.first().is_none_or(|best| best.score < PROMISING.max(least)) {
-            return Vec::new();
+        if !promises(&heard, PROMISING) {
+            return self.with_exchanged(tried);
         }
-        let mut tried = Tried::new(&ROUNDS_BESIDE, single.explanation.score);
         self.descend_on(&mut tried, self.beside_of(&heard, &base, &single.left, &[]));
         self.with_exchanged(tried)
     }

@@ -1,10 +1,13 @@
 //! Effects whose action jumps with their size, at sizes all over their range: derivatives say nothing of them.
 
+use std::ops::Range;
+
 use nalgebra::DMatrix;
 use rayon::prelude::*;
+use sim::Setting;
 
 use super::atlas::{Atlas, White};
-use super::beside::Base;
+use super::beside::{Base, best_multiple};
 use super::hunt::{Hunt, Look};
 use super::hypothesis::{Hypothesis, Part, Shape};
 use super::pairs::{Columns, Piece};
@@ -91,10 +94,7 @@ impl Trial<'_> {
             (self.atlas.probes[probe].scanned, [0..1, 0..1])
         };
         let sizes = &self.atlas.probes[probe].sizes;
-        let (low, high) = (sizes[0], sizes[sizes.len() - 1]);
-        // Sizes in a constant ratio: what matters is how many steps fit into a speed or a reading.
-        let ratio = (high / low).powf(1.0 / f64::from(count - 1));
-        let sizes: Vec<f64> = (0..count).map(|i| low * ratio.powf(f64::from(i))).collect();
+        let (ratio, sizes) = in_constant_ratio(sizes[0], sizes[sizes.len() - 1], count);
         Some(Scan {
             probe,
             ratio,
@@ -102,9 +102,77 @@ impl Trial<'_> {
             looks: self.looks(base, probe, &sizes, &sets),
         })
     }
+
+    /// A probe that jumps with each of those that do not, at sizes close about the one to which it came alone: the best few. What the
+    /// other does is simulated beside it, because rounding makes another thing of it.
+    fn screen_about(&self, probe: usize, size: f64, most: usize) -> Vec<Beside> {
+        const SETS: [Range<u64>; 2] = [0..2, 2..4];
+        const COUNT: u32 = 81;
+        /// Share of the size to either side.
+        const REACH: f64 = 0.004;
+        let nothing = self.atlas.at_rest(Hypothesis::nothing());
+        let left = |settings: &[Setting]| -> Option<[White; 2]> {
+            let [one, other] = SETS.map(|sets| self.left_beside(&nothing, settings, sets));
+            Some([one?, other?])
+        };
+        let jumping = self.atlas.probes[probe].setting(size);
+        let Some(alone) = left(std::slice::from_ref(&jumping)) else {
+            return Vec::new();
+        };
+        let (ratio, sizes) = in_constant_ratio(size * (1.0 - REACH), size * (1.0 + REACH), COUNT);
+        let looks = self.looks(&nothing, probe, &sizes, &SETS);
+        let before = self.left_beyond(&nothing, &self.atlas.null).norm_squared();
+        let best_about = |&(other, other_size): &(usize, f64)| {
+            let beside = left(&[jumping.clone(), self.atlas.probes[other].setting(other_size)])?;
+            let [a, b] = [0, 1].map(|i| &alone[i] - &beside[i]);
+            let square = a.dot(&b);
+            let at_look = |look: &Look| {
+                let product = 0.5 * (look.left[0].dot(&b) + look.left[1].dot(&a));
+                let (multiple, gain) = best_multiple(product, square);
+                let neutral = self.atlas.probes[other].neutral;
+                Beside {
+                    score: self
+                        .atlas
+                        .score_of_pair([probe, other], 0.5 * (before - look.square()) + gain),
+                    other,
+                    other_size: neutral + multiple * (other_size - neutral),
+                    jumping: probe,
+                    size: look.size,
+                    spacing: look.size * (ratio - 1.0),
+                }
+            };
+            looks
+                .iter()
+                .map(at_look)
+                .max_by(|a, b| a.score.total_cmp(&b.score))
+        };
+        let mut all: Vec<Beside> = (self.atlas.smallest_sizes().par_iter())
+            .filter_map(best_about)
+            .collect();
+        all.sort_by(|a, b| b.score.total_cmp(&a.score));
+        self.atlas.diverse_beside(all, most)
+    }
 }
 
 impl Atlas {
+    /// Every probe that does not jump at its smallest sizes to either side of nothing.
+    fn smallest_sizes(&self) -> Vec<(usize, f64)> {
+        let of_probe = |number: usize| {
+            let probe = &self.probes[number];
+            let up = probe.sizes.iter().copied().find(|size| *size > probe.neutral);
+            let down = probe.sizes.iter().copied().rfind(|size| *size < probe.neutral);
+            let mirrored = up.filter(|_| probe.odd).map(|size| 2.0 * probe.neutral - size);
+            [down.or(mirrored), up]
+                .into_iter()
+                .flatten()
+                .map(move |size| (number, size))
+        };
+        (0..self.probes.len())
+            .filter(|&probe| !self.probes[probe].jumps())
+            .flat_map(of_probe)
+            .collect()
+    }
+
     /// The constant probes that do not jump which explain a residual best beside every scanned one, best first: of a probe that
     /// jumps few at a size and about it.
     fn screen_beside_scans(&self, residual: &White, scans: &[Scan], most: usize) -> Vec<Beside> {
@@ -215,6 +283,20 @@ impl Search<'_> {
             .screen_beside_scans(self.residual, self.scanned(), HEARD)
     }
 
+    /// A single effect that jumps with what goes best with it at sizes close about its own: another effect beside which that does not
+    /// show may have had a share in it.
+    pub(super) fn pairs_about(&self, single: &Found) -> Vec<Hypothesis> {
+        const HEARD: usize = 8;
+        match single.hypothesis.parts.as_slice() {
+            [part] if part.held.is_some() => {
+                self.tell(format_args!("sizes about that of {}", single.explanation.label()));
+                let screened = (self.trial).screen_about(part.probe, part.mean_size(self.atlas()), HEARD);
+                self.pairs_that_jump(&self.hunts_of_pairs(&screened))
+            }
+            _ => Vec::new(),
+        }
+    }
+
     /// Such pairs, those that come nearest first, as far as the other's size follows.
     pub(super) fn hunts_of_pairs(&self, screened: &[Beside]) -> Vec<Hunt> {
         self.tell(format_args!("which sizes that jump go with another effect"));
@@ -277,6 +359,13 @@ impl Search<'_> {
     fn jumping(&self) -> impl Iterator<Item = usize> {
         (0..self.atlas().probes.len()).filter(|&probe| self.atlas().probes[probe].jumps())
     }
+}
+
+/// So many sizes between two in a constant ratio, and that: what matters is how many steps fit into a speed or a reading.
+fn in_constant_ratio(low: f64, high: f64, count: u32) -> (f64, Vec<f64>) {
+    let ratio = (high / low).powf(1.0 / f64::from(count - 1));
+    let sizes = (0..count).map(|i| low * ratio.powf(f64::from(i))).collect();
+    (ratio, sizes)
 }
 
 /// The places of numbers that are not larger than their neighbours, the smallest number first.

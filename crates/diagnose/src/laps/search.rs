@@ -264,6 +264,21 @@ impl Search<'_> {
         self.settle(self.descend(starts.iter(), &ROUNDS_FROM_NEAR, f64::NEG_INFINITY))
     }
 
+    /// An explanation with other effects in place of those at a place on a wall, at the same place, tried to the end: places were
+    /// screened at a coarse grid.
+    pub(super) fn at_same_place(&self, best: &Found) -> Vec<Found> {
+        let hypothesis = &best.hypothesis;
+        let exchanged = |i: usize| {
+            let others = hypothesis.parts[i].at_same_place(self.atlas());
+            let rest = hypothesis.without(i);
+            others
+                .into_iter()
+                .map(move |other| rest.with(&Hypothesis::of(other)))
+        };
+        let starts: Vec<Hypothesis> = (0..hypothesis.parts.len()).flat_map(exchanged).collect();
+        self.try_rounds(starts.iter(), &ROUNDS)
+    }
+
     /// Explanations with what explains best what they leave beside them, tried to the end.
     pub(super) fn further<'f>(&self, best: impl Iterator<Item = &'f Found>) -> Vec<Found> {
         /// Share of the best score below which a third effect does not make up for what the first two leave.
