@@ -283,6 +283,9 @@ fn with_others_there(search: &Search<'_>, mut found: Vec<Found>) -> Vec<Found> {
         return found;
     };
     for other in search.at_same_place(best) {
+        if (found.iter()).any(|known| known.hypothesis.is_near(&other.hypothesis, search.atlas())) {
+            continue;
+        }
         let comes_before = |one: &Found| {
             one.explanation.score < other.explanation.score
                 || one.explanation.effects.len() != other.explanation.effects.len()
@@ -485,5 +488,74 @@ impl Atlas {
             before,
             after.map(|residual| FourNumbers::new(&residual, &self.layout)),
         ))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
+
+    use sim::find;
+
+    use super::*;
+    use crate::Candidate;
+
+    /// An explanation by some names that leaves what has a probability, with its share of the excess and its score.
+    fn by(names: &[&str], remainder_p: f64, share: f64, score: f64) -> Explanation {
+        let candidate = |name: &&str| Candidate {
+            setting: Setting::constant(find(name).expect("a name"), [1.1]),
+            standard_errors: vec![0.01],
+            intervals: BTreeMap::new(),
+            gain: score,
+            fitted: 1,
+        };
+        Explanation {
+            effects: names.iter().map(candidate).collect(),
+            score,
+            gain: score,
+            share,
+            remainder_p: Some(remainder_p),
+            remainder: None,
+        }
+    }
+
+    #[test]
+    fn what_leaves_nothing_significant_or_next_to_nothing_is_explained() {
+        for (p, share) in [(0.3, 0.9), (0.002, 0.9), (2e-6, 0.985)] {
+            let one = by(&["wheel-scale"], p, share, 500.0);
+            assert_eq!(verdict_of(&one), Verdict::Explained, "{p} {share}");
+        }
+        let two = ["wheel-scale", "reading-gain"];
+        assert_eq!(verdict_of(&by(&two, 2e-6, 0.996, 5000.0)), Verdict::Explained);
+        assert_ne!(verdict_of(&by(&two, 2e-6, 0.985, 5000.0)), Verdict::Explained);
+    }
+
+    #[test]
+    fn what_leaves_much_is_claimed_in_part_where_little_else_could_be_it() {
+        let two = ["wheel-scale", "reading-gain"];
+        for (names, p, share, score, claimed) in [
+            (&two[..], 1e-30, 0.95, 5000.0, true),
+            (&two[..], 1e-30, 0.85, 5000.0, false),
+            // Of a weak signal what is left must be hardly more than chance.
+            (&two[..], 1e-30, 0.95, 1500.0, false),
+            (&two[..], 3e-4, 0.95, 1500.0, true),
+            (&two[..], 3e-5, 0.95, 1500.0, false),
+            (&two[..1], 1e-30, 0.97, 5000.0, false),
+            (&two[..1], 1e-30, 0.99, 5000.0, true),
+        ] {
+            let verdict = verdict_of(&by(names, p, share, score));
+            let expected = if claimed {
+                Verdict::PartlyExplained
+            } else {
+                Verdict::Unexplained
+            };
+            assert_eq!(verdict, expected, "{names:?} {p} {share} {score}");
+        }
+    }
+
+    #[test]
+    fn effects_on_noise_do_not_heap_up() {
+        let noises = by(&["slip-level", "camera-noise"], 0.5, 1.0, 500.0);
+        assert_eq!(verdict_of(&noises), Verdict::Unexplained);
     }
 }

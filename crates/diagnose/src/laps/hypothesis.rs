@@ -7,7 +7,7 @@ use sim::{Pattern, Setting};
 
 use super::atlas::Atlas;
 use super::intervals::Interval;
-use super::probe::Probe;
+use super::probe::{Probe, other_at_place};
 use super::screen::{at, worth};
 use super::tests_of_fit::Quadratic;
 use crate::candidate::{apart, round, take_mean_of_others, within};
@@ -135,40 +135,22 @@ impl Part {
         }
     }
 
-    /// The other effects that act at a place of a wall at this one's, to either side of nothing; none of what has no place.
+    /// The other effect that acts at a place of a wall at this one's, to either side of nothing; none beside what has no place.
     pub(super) fn at_same_place(&self, atlas: &Atlas) -> Vec<Self> {
-        let own = &atlas.probes[self.probe];
-        let place = |probe: &Probe, values: &[f64]| -> Option<[f64; 3]> {
-            let value =
-                |name: &str| Some(values[probe.spec.params.iter().position(|param| param.name == name)?]);
-            Some([value("wall")?, value("position")?, value("length_m")?])
-        };
-        let Some([wall, position, length_m]) = place(own, &self.values[0]) else {
+        let Some(number) = other_at_place(&atlas.probes, self.probe, &self.values[0]) else {
             return Vec::new();
         };
-        let others = (atlas.probes.iter().enumerate()).filter(|(_, other)| other.spec != own.spec);
-        let off = |other: &Probe| {
-            let [on, at, _] = place(other, other.origin())?;
-            (on == wall).then_some((at - position).abs())
+        let other = &atlas.probes[number];
+        let at_size = |size: f64| {
+            let mut part = Self::screened(atlas, number, Shape::Constant, &[size]);
+            other.move_to_place_of(&mut part.values[0], &atlas.probes[self.probe], &self.values[0]);
+            part
         };
-        let nearest = others.filter_map(|(number, other)| Some((off(other)?, number, other)));
-        let Some((_, number, other)) = nearest.min_by(|a, b| a.0.total_cmp(&b.0)) else {
-            return Vec::new();
-        };
-        let at_size = |size: &f64| {
-            [*size, 2.0 * other.neutral - size].map(|size| {
-                let mut part = Self::screened(atlas, number, Shape::Constant, &[size]);
-                for (param, value) in other.spec.params.iter().zip(&mut part.values[0]) {
-                    match param.name {
-                        "position" => *value = position,
-                        "length_m" => *value = length_m,
-                        _ => {}
-                    }
-                }
-                part
-            })
-        };
-        other.sizes.iter().flat_map(at_size).collect()
+        let sizes = other
+            .sizes
+            .iter()
+            .flat_map(|size| [*size, 2.0 * other.neutral - size]);
+        sizes.map(at_size).collect()
     }
 
     /// A group of basis functions at multiples of its steps.

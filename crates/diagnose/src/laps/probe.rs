@@ -115,6 +115,27 @@ impl Probe {
         self.spec.params.iter().any(|param| param.name == "position")
     }
 
+    /// Wall, position and length of a place where it acts with such values; `None` without a place.
+    fn place(&self, values: &[f64]) -> Option<[f64; 3]> {
+        let value = |name: &str| Some(values[self.spec.params.iter().position(|param| param.name == name)?]);
+        Some([value("wall")?, value("position")?, value("length_m")?])
+    }
+
+    /// Brings its values to the place where another one acts with such values.
+    pub(super) fn move_to_place_of(&self, own: &mut [f64], other: &Self, values: &[f64]) {
+        let Some([wall, position, length_m]) = other.place(values) else {
+            return;
+        };
+        for (param, own) in self.spec.params.iter().zip(own) {
+            match param.name {
+                "wall" => *own = wall,
+                "position" => *own = position,
+                "length_m" => *own = length_m,
+                _ => {}
+            }
+        }
+    }
+
     /// The values where nothing is done.
     pub(super) fn origin(&self) -> &[f64] {
         &self.origin
@@ -281,6 +302,19 @@ fn places(name: &str, length_m: f64, size: f64) -> Vec<Probe> {
     probes
 }
 
+/// The probe of another effect that is nearest to the place, on the same wall, where one acts with such values.
+pub(super) fn other_at_place(probes: &[Probe], one: usize, values: &[f64]) -> Option<usize> {
+    let [wall, position, _] = probes[one].place(values)?;
+    let off = |other: &Probe| {
+        let [on, at, _] = other.place(other.origin())?;
+        (on == wall && other.spec != probes[one].spec).then_some((at - position).abs())
+    };
+    let nearest = (probes.iter().enumerate()).filter_map(|(number, other)| Some((off(other)?, number)));
+    nearest
+        .min_by(|a, b| a.0.total_cmp(&b.0))
+        .map(|(_, number)| number)
+}
+
 /// Everything that is tried. A list of sizes spans what robots of this kind do; fits may leave it.
 ///
 /// `controller-speed` is not among them, because laps cannot tell it from `wheel-scale`.
@@ -388,5 +422,38 @@ mod tests {
         // Twenty-four places a wall, chosen before.
         is("wall-bump", 1, 0.008 / STEP);
         is("wall-bump", 0, 0.024);
+    }
+
+    #[test]
+    fn at_the_place_of_a_bump_may_be_a_patch_on_the_same_wall() {
+        let probes = probes();
+        let number = |name: &str| {
+            probes
+                .iter()
+                .position(|probe| probe.spec.name == name)
+                .expect("tried")
+        };
+        let bump = number("wall-bump");
+        let place = |values: &[f64]| probes[bump].place(values).expect("a bump has a place");
+        let mut values = probes[bump].values(0.01);
+        for (param, value) in probes[bump].spec.params.iter().zip(&mut values) {
+            match param.name {
+                "wall" => *value = 1.0,
+                "position" => *value = 0.734,
+                "length_m" => *value = 0.11,
+                _ => {}
+            }
+        }
+        assert_eq!(place(&values), [1.0, 0.734, 0.11]);
+        let patch = &probes[other_at_place(&probes, bump, &values).expect("a patch has one too")];
+        assert_eq!(patch.spec.name, "reflectance-patch");
+        let [wall, position, _] = patch.place(patch.origin()).expect("a place");
+        assert!(wall == 1.0 && (position - 0.734).abs() <= 0.5 / 24.0);
+        let mut moved = patch.values(1.5);
+        patch.move_to_place_of(&mut moved, &probes[bump], &values);
+        assert_eq!(patch.place(&moved), Some([1.0, 0.734, 0.11]));
+        assert!(moved.contains(&1.5));
+        let gain = number("reading-gain");
+        assert_eq!(other_at_place(&probes, gain, &probes[gain].values(1.1)), None);
     }
 }
