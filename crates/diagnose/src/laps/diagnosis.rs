@@ -277,12 +277,15 @@ fn explain(search: &Search<'_>, mut found: Vec<Found>) -> Vec<Found> {
     held_still(search, with_others_there(search, simplified(search, found)))
 }
 
-/// Explanations with those of other effects at the places on walls of the first one's effects, in their order.
+/// Explanations with those of other effects at the places on walls of the first one's effects, and of those near it with other
+/// sensors, in their order.
 fn with_others_there(search: &Search<'_>, mut found: Vec<Found>) -> Vec<Found> {
     let Some(best) = found.first().filter(|best| is_claimed(&best.explanation)) else {
         return found;
     };
-    for other in search.at_same_place(best) {
+    let mut others = search.at_same_place(best);
+    others.extend(search.at_other_sensors(&found));
+    for other in others {
         if (found.iter()).any(|known| known.hypothesis.is_near(&other.hypothesis, search.atlas())) {
             continue;
         }

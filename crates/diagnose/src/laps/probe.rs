@@ -121,6 +121,19 @@ impl Probe {
         Some([value("wall")?, value("position")?, value("length_m")?])
     }
 
+    /// Whether it is the same effect at another one of the sensors.
+    pub(super) fn is_at_other_sensor(&self, other: &Self) -> bool {
+        let sensor = |probe: &Self| {
+            let index = probe
+                .spec
+                .params
+                .iter()
+                .position(|param| param.name == "sensor")?;
+            Some(probe.origin[index])
+        };
+        self.spec == other.spec && sensor(self) != sensor(other)
+    }
+
     /// Brings its values to the place where another one acts with such values.
     pub(super) fn move_to_place_of(&self, own: &mut [f64], other: &Self, values: &[f64]) {
         let Some([wall, position, length_m]) = other.place(values) else {
@@ -425,7 +438,7 @@ mod tests {
     }
 
     #[test]
-    fn at_the_place_of_a_bump_may_be_a_patch_on_the_same_wall() {
+    fn at_the_place_of_a_bump_may_be_a_patch_on_the_same_wall_and_a_sensor_may_be_another() {
         let probes = probes();
         let number = |name: &str| {
             probes
@@ -454,6 +467,12 @@ mod tests {
         assert_eq!(patch.place(&moved), Some([1.0, 0.734, 0.11]));
         assert!(moved.contains(&1.5));
         let gain = number("reading-gain");
+        let at_sensor = number("one-sensor-gain");
+        let others = probes
+            .iter()
+            .filter(|probe| probe.is_at_other_sensor(&probes[at_sensor]));
+        assert_eq!(others.count(), 5);
+        assert!(!probes.iter().any(|probe| probe.is_at_other_sensor(&probes[gain])));
         assert_eq!(other_at_place(&probes, gain, &probes[gain].values(1.1)), None);
     }
 }

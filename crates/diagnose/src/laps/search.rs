@@ -279,6 +279,30 @@ impl Search<'_> {
         self.try_rounds(starts.iter(), &ROUNDS)
     }
 
+    /// Explanations near the best with the same effects at the other sensors, tried to the end: of one effect two were so far.
+    pub(super) fn at_other_sensors(&self, found: &[Found]) -> Vec<Found> {
+        const NEAR: f64 = 8.0;
+        const MOST: usize = 3;
+        let score = |found: &Found| found.explanation.score;
+        let best = found.first().map_or(f64::INFINITY, score);
+        let mut starts: Vec<Hypothesis> = Vec::new();
+        for near in found.iter().take(MOST).filter(|found| score(found) > best - NEAR) {
+            for (i, part) in near.hypothesis.parts.iter().enumerate() {
+                let rest = near.hypothesis.without(i);
+                let others = part.at_other_sensors(self.atlas()).into_iter();
+                starts.extend(others.map(|other| rest.with(&Hypothesis::of(other))));
+            }
+        }
+        let mut known: Vec<Vec<usize>> = found.iter().map(|found| found.hypothesis.probes()).collect();
+        starts.retain(|start| {
+            let probes = start.probes();
+            let new = !known.contains(&probes);
+            known.push(probes);
+            new
+        });
+        self.settle(self.descend(starts.iter(), &ROUNDS, best))
+    }
+
     /// Explanations with what explains best what they leave beside them, tried to the end.
     pub(super) fn further<'f>(&self, best: impl Iterator<Item = &'f Found>) -> Vec<Found> {
         /// Share of the best score below which a third effect does not make up for what the first two leave.
