@@ -274,16 +274,16 @@ fn explain(search: &Search<'_>, mut found: Vec<Found>) -> Vec<Found> {
         let unnamed = search.unnamed(&found);
         found = unless_named(found, unnamed);
     }
-    held_still(search, with_others_there(search, simplified(search, found)))
+    held_still(search, with_others_alike(search, simplified(search, found)))
 }
 
-/// Explanations with those of other effects at the places on walls of the first one's effects, and of those near it with other
-/// sensors, in their order.
-fn with_others_there(search: &Search<'_>, mut found: Vec<Found>) -> Vec<Found> {
+/// Explanations with those that are the first but for a bump or patch at the same place of a wall or another kind of slip, and
+/// those near it but for other sensors, in their order.
+fn with_others_alike(search: &Search<'_>, mut found: Vec<Found>) -> Vec<Found> {
     let Some(best) = found.first().filter(|best| is_claimed(&best.explanation)) else {
         return found;
     };
-    let mut others = search.at_same_place(best);
+    let mut others = search.otherwise(best);
     others.extend(search.at_other_sensors(&found));
     for other in others {
         if (found.iter()).any(|known| known.hypothesis.is_near(&other.hypothesis, search.atlas())) {

@@ -153,6 +153,20 @@ impl Part {
         sizes.map(at_size).collect()
     }
 
+    /// The other kind of slip, level or memory, with which wheels are as far off after a while; `None` of other effects and of less
+    /// slip than declared.
+    pub(super) fn slipping_otherwise(&self, atlas: &Atlas) -> Option<Self> {
+        let size = self.mean_size(atlas);
+        let (name, size) = match atlas.probes[self.probe].spec.name {
+            "slip-level" => ("slip-memory", memory_of(size)),
+            "slip-memory" => ("slip-level", level_of(size)),
+            _ => return None,
+        };
+        let number = atlas.probes.iter().position(|probe| probe.spec.name == name)?;
+        let more = size > atlas.probes[number].neutral;
+        more.then(|| Self::screened(atlas, number, Shape::Constant, &[size]))
+    }
+
     /// The same at the other sensors; none of what acts on all.
     pub(super) fn at_other_sensors(&self, atlas: &Atlas) -> Vec<Self> {
         let own = &atlas.probes[self.probe];
@@ -361,6 +375,17 @@ impl Part {
 }
 
 /// Time at which a run's laps are half done: the kept ones begin one and a half laps after the run, on average.
+/// The level of slip that scatters ways as a memory does: a first-order autoregression's noise adds up to (1 + c) / (1 - c) times
+/// the variance of white noise of as much.
+fn level_of(correlation: f64) -> f64 {
+    ((1.0 + correlation) / (1.0 - correlation)).sqrt()
+}
+
+/// The memory that does as a level.
+fn memory_of(level: f64) -> f64 {
+    (level.powi(2) - 1.0) / (level.powi(2) + 1.0)
+}
+
 fn middle_s(atlas: &Atlas) -> f64 {
     (1.5 + atlas.run_laps() as f64 / 2.0) * atlas.lap_s()
 }
@@ -687,6 +712,12 @@ fn differ(values: &[(f64, f64)]) -> Quadratic {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_memory_of_six_tenths_scatters_as_twice_the_level() {
+        assert!((level_of(0.6) - 2.0).abs() < 1e-12 && (memory_of(2.0) - 0.6).abs() < 1e-12);
+        assert_eq!(memory_of(1.0), 0.0);
+    }
 
     #[test]
     fn a_likelihood_leaves_its_mean_over_the_range() {

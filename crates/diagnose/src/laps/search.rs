@@ -264,16 +264,16 @@ impl Search<'_> {
         self.settle(self.descend(starts.iter(), &ROUNDS_FROM_NEAR, f64::NEG_INFINITY))
     }
 
-    /// An explanation with other effects in place of those at a place on a wall, at the same place, tried to the end: places were
-    /// screened at a coarse grid.
-    pub(super) fn at_same_place(&self, best: &Found) -> Vec<Found> {
+    /// An explanation with a patch of a wall in place of a bump or the other way round, and with slip of the other kind, tried to the end:
+    /// places were screened at a coarse grid, and of slip by the noise of paths.
+    pub(super) fn otherwise(&self, best: &Found) -> Vec<Found> {
         let hypothesis = &best.hypothesis;
         let exchanged = |i: usize| {
-            let others = hypothesis.parts[i].at_same_place(self.atlas());
+            let part = &hypothesis.parts[i];
+            let others = part.at_same_place(self.atlas()).into_iter();
+            let others = others.chain(part.slipping_otherwise(self.atlas()));
             let rest = hypothesis.without(i);
-            others
-                .into_iter()
-                .map(move |other| rest.with(&Hypothesis::of(other)))
+            others.map(move |other| rest.with(&Hypothesis::of(other)))
         };
         let starts: Vec<Hypothesis> = (0..hypothesis.parts.len()).flat_map(exchanged).collect();
         self.try_rounds(starts.iter(), &ROUNDS)
