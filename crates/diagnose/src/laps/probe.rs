@@ -87,6 +87,17 @@ impl Probe {
         }
     }
 
+    /// Of the sizes that are simulated beforehand, or stand for opposite ones, those that do least to either side of nothing.
+    pub(super) fn smallest_sizes(&self) -> Vec<f64> {
+        if self.limit {
+            return self.sizes.last().copied().into_iter().collect();
+        }
+        let up = self.sizes.iter().copied().find(|size| *size > self.neutral);
+        let down = self.sizes.iter().copied().rfind(|size| *size < self.neutral);
+        let mirrored = up.filter(|_| self.odd).map(|size| 2.0 * self.neutral - size);
+        down.or(mirrored).into_iter().chain(up).collect()
+    }
+
     /// How far one of its free numbers goes among robots of this kind: sizes as far as those that are simulated beforehand, a
     /// place as far as the choice among places leaves it.
     pub(super) fn range_of(&self, number: usize) -> f64 {
@@ -435,6 +446,20 @@ mod tests {
         // Twenty-four places a wall, chosen before.
         is("wall-bump", 1, 0.008 / STEP);
         is("wall-bump", 0, 0.024);
+    }
+
+    #[test]
+    fn smallest_sizes_do_least_to_either_side() {
+        let smallest = |name: &str| {
+            let probes = probes();
+            let found = probes.iter().find(|probe| probe.spec.name == name);
+            found.expect("the effect is tried").smallest_sizes()
+        };
+        assert_eq!(smallest("reading-gain"), [0.93, 1.07]);
+        assert_eq!(smallest("sensor-lag"), [0.06]);
+        assert_eq!(smallest("acceleration-limit"), [1.5]);
+        // Its opposite is not simulated beforehand.
+        assert_eq!(smallest("wall-bump"), [-0.012, 0.012]);
     }
 
     #[test]

@@ -155,17 +155,11 @@ impl Trial<'_> {
 }
 
 impl Atlas {
-    /// Every probe that does not jump at its smallest sizes to either side of nothing.
+    /// Every probe that does not jump at its smallest sizes.
     fn smallest_sizes(&self) -> Vec<(usize, f64)> {
         let of_probe = |number: usize| {
-            let probe = &self.probes[number];
-            let up = probe.sizes.iter().copied().find(|size| *size > probe.neutral);
-            let down = probe.sizes.iter().copied().rfind(|size| *size < probe.neutral);
-            let mirrored = up.filter(|_| probe.odd).map(|size| 2.0 * probe.neutral - size);
-            [down.or(mirrored), up]
-                .into_iter()
-                .flatten()
-                .map(move |size| (number, size))
+            let sizes = self.probes[number].smallest_sizes().into_iter();
+            sizes.map(move |size| (number, size))
         };
         (0..self.probes.len())
             .filter(|&probe| !self.probes[probe].jumps())
