@@ -10,6 +10,7 @@ mod least_squares;
 mod log;
 mod mean_laps;
 mod response_fit;
+mod slip;
 
 pub use answer::{Answer, Cause, Explanation, Verdict};
 pub use candidate::Candidate;

@@ -50,6 +50,7 @@ pub(super) fn errors(
             let places = &recording.places(effects)[runs];
             mean_laps(&recording.setup, effects, seed, wanted, places)
         };
+        let off_m = |laps: &MeanLaps, run: &SampledRun| laps.distance_m(&run.offsets_m());
         let all_runs = 0..recording.measured.runs.len();
         let before = laps_of(&[], all_runs.clone())?;
         let settings = answer.settings();
@@ -62,22 +63,17 @@ pub(super) fn errors(
             Some((at, _)) if *at != place => continue,
             Some((_, runs)) => (
                 runs.clone(),
-                runs.iter()
-                    .map(|run| before.distance_m(&run.offsets_m()))
-                    .collect(),
-                runs.iter()
-                    .map(|run| after.distance_m(&run.offsets_m()))
-                    .collect(),
+                runs.iter().map(|run| off_m(&before, run)).collect(),
+                runs.iter().map(|run| off_m(&after, run)).collect(),
             ),
             None => {
                 let runs = recording.measured.runs.clone();
                 let (mut before_m, mut after_m) = (Vec::new(), Vec::new());
                 for (at, run) in runs.iter().enumerate() {
                     let without = &answer.left_out[recording.first_run + at];
-                    let distance_m =
-                        |effects| anyhow::Ok(laps_of(effects, at..at + 1)?.distance_m(&run.offsets_m()));
+                    let distance_m = |effects| anyhow::Ok(off_m(&laps_of(effects, at..at + 1)?, run));
                     let own_m = if recording.runs_are_alike() {
-                        before.distance_m(&run.offsets_m())
+                        off_m(&before, run)
                     } else {
                         distance_m(&[])?
                     };

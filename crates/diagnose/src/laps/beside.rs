@@ -106,6 +106,22 @@ impl Trial<'_> {
         let found = self.simulated_briefly(&settings, sets)?;
         Some(self.left_beyond(base, &found))
     }
+
+    /// The same by two groups of data sets: if these are different, products of what they leave have no noise on average.
+    pub(super) fn left_twice(
+        &self,
+        base: &Base,
+        further: &[Setting],
+        sets: &[Range<u64>; 2],
+    ) -> Option<[White; 2]> {
+        let first = self.left_beside(base, further, sets[0].clone())?;
+        let second = if sets[0] == sets[1] {
+            first.clone()
+        } else {
+            self.left_beside(base, further, sets[1].clone())?
+        };
+        Some([first, second])
+    }
 }
 
 impl Atlas {
@@ -181,11 +197,7 @@ impl Search<'_> {
         const SETS: [Range<u64>; 2] = [0..4, 4..8];
         let probe_of = |s: &Screened| s.hypothesis.parts[0].probe;
         let spec_of = |probe: usize| self.atlas().probes[probe].spec;
-        let left = |further: &[Setting]| -> Option<[White; 2]> {
-            let left = |sets| self.trial.left_beside(base, further, sets);
-            let [one, other] = SETS.map(left);
-            Some([one?, other?])
-        };
+        let left = |further: &[Setting]| self.trial.left_twice(base, further, &SETS);
         let (Some(first), Some(left_by_base)) = (screened.first(), left(&[])) else {
             return screened;
         };
@@ -206,9 +218,7 @@ impl Search<'_> {
                 let constant = screened.iter().find(constant);
                 let best = constant.and_then(|constant| {
                     let with = left(&constant.hypothesis.settings(self.atlas()))?;
-                    let [a, b] = [0, 1].map(|i| &left_by_base[i] - &with[i]);
-                    let product = 0.5 * (left_by_base[0].dot(&b) + left_by_base[1].dot(&a));
-                    let (multiple, gain) = best_multiple(product, a.dot(&b));
+                    let (multiple, gain) = explains(&difference(&left_by_base, &with), &left_by_base);
                     let score = self.atlas().score_of_constant(probe, gain);
                     Some((multiple, score - constant.score))
                 });
@@ -261,9 +271,21 @@ impl Search<'_> {
     }
 }
 
+/// What one thing leaves less what another does, each by two groups of data sets.
+pub(super) fn difference(one: &[White; 2], other: &[White; 2]) -> [White; 2] {
+    [0, 1].map(|i| &one[i] - &other[i])
+}
+
+/// The multiple of an action that explains most of what is left, and half the squared distance that it gains, both by two groups
+/// of data sets.
+pub(super) fn explains(action: &[White; 2], left: &[White; 2]) -> (f64, f64) {
+    let product = 0.5 * (left[0].dot(&action[1]) + left[1].dot(&action[0]));
+    best_multiple(product, action[0].dot(&action[1]))
+}
+
 /// The multiple of an action that explains most, by its product with what is to be explained and its square, and half the squared
 /// distance that it gains. It is not more than twice as much as was simulated.
-pub(super) fn best_multiple(product: f64, square: f64) -> (f64, f64) {
+fn best_multiple(product: f64, square: f64) -> (f64, f64) {
     const MOST: f64 = 2.0;
     let multiple = (product / square.max(f64::MIN_POSITIVE)).clamp(0.0, MOST);
     (multiple, multiple * product - 0.5 * multiple * multiple * square)

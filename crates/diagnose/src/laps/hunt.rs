@@ -205,17 +205,8 @@ impl Trial<'_> {
     ) -> Vec<Look> {
         let look = |&size: &f64| {
             let further = [self.atlas.probes[probe].setting(size)];
-            let left = |i: usize| self.left_beside(base, &further, sets[i].clone());
-            let first = left(0)?;
-            let second = if sets[0] == sets[1] {
-                first.clone()
-            } else {
-                left(1)?
-            };
-            Some(Look {
-                size,
-                left: [first, second],
-            })
+            let left = self.left_twice(base, &further, sets)?;
+            Some(Look { size, left })
         };
         sizes.par_iter().filter_map(look).collect()
     }

@@ -11,6 +11,7 @@ use super::probe::{Probe, other_at_place};
 use super::screen::{at, worth};
 use super::tests_of_fit::Quadratic;
 use crate::candidate::{apart, round, take_mean_of_others, within};
+use crate::slip::{level_of, memory_of};
 
 /// How an effect goes over the runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -146,11 +147,7 @@ impl Part {
             other.move_to_place_of(&mut part.values[0], &atlas.probes[self.probe], &self.values[0]);
             part
         };
-        let sizes = other
-            .sizes
-            .iter()
-            .flat_map(|size| [*size, 2.0 * other.neutral - size]);
-        sizes.map(at_size).collect()
+        other.smallest_sizes().into_iter().map(at_size).collect()
     }
 
     /// The other kind of slip, level or memory, with which wheels are as far off after a while; `None` of other effects and of less
@@ -209,8 +206,7 @@ impl Part {
 
     /// The same with its size a multiple as far from the neutral one.
     pub(super) fn times(&self, multiple: f64, atlas: &Atlas) -> Self {
-        let neutral = atlas.probes[self.probe].neutral;
-        let size = neutral + multiple * (self.mean_size(atlas) - neutral);
+        let size = atlas.probes[self.probe].times(self.mean_size(atlas), multiple);
         Self::screened(atlas, self.probe, Shape::Constant, &[size])
     }
 
@@ -375,17 +371,6 @@ impl Part {
 }
 
 /// Time at which a run's laps are half done: the kept ones begin one and a half laps after the run, on average.
-/// The level of slip that scatters ways as a memory does: a first-order autoregression's noise adds up to (1 + c) / (1 - c) times
-/// the variance of white noise of as much.
-fn level_of(correlation: f64) -> f64 {
-    ((1.0 + correlation) / (1.0 - correlation)).sqrt()
-}
-
-/// The memory that does as a level.
-fn memory_of(level: f64) -> f64 {
-    (level.powi(2) - 1.0) / (level.powi(2) + 1.0)
-}
-
 fn middle_s(atlas: &Atlas) -> f64 {
     (1.5 + atlas.run_laps() as f64 / 2.0) * atlas.lap_s()
 }
@@ -712,12 +697,6 @@ fn differ(values: &[(f64, f64)]) -> Quadratic {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_memory_of_six_tenths_scatters_as_twice_the_level() {
-        assert!((level_of(0.6) - 2.0).abs() < 1e-12 && (memory_of(2.0) - 0.6).abs() < 1e-12);
-        assert_eq!(memory_of(1.0), 0.0);
-    }
 
     #[test]
     fn a_likelihood_leaves_its_mean_over_the_range() {

@@ -89,12 +89,9 @@ impl Probe {
 
     /// Of the sizes that are simulated beforehand, or stand for opposite ones, those that do least to either side of nothing.
     pub(super) fn smallest_sizes(&self) -> Vec<f64> {
-        if self.limit {
-            return self.sizes.last().copied().into_iter().collect();
-        }
         let up = self.sizes.iter().copied().find(|size| *size > self.neutral);
         let down = self.sizes.iter().copied().rfind(|size| *size < self.neutral);
-        let mirrored = up.filter(|_| self.odd).map(|size| 2.0 * self.neutral - size);
+        let mirrored = up.filter(|_| self.odd).map(|size| self.times(size, -1.0));
         down.or(mirrored).into_iter().chain(up).collect()
     }
 
@@ -123,25 +120,18 @@ impl Probe {
 
     /// Whether it acts at a place of a wall; place and length are fitted with the size.
     pub(super) fn has_place(&self) -> bool {
-        self.spec.params.iter().any(|param| param.name == "position")
+        self.spec.place_of("position").is_some()
     }
 
     /// Wall, position and length of a place where it acts with such values; `None` without a place.
     fn place(&self, values: &[f64]) -> Option<[f64; 3]> {
-        let value = |name: &str| Some(values[self.spec.params.iter().position(|param| param.name == name)?]);
+        let value = |name: &str| Some(values[self.spec.place_of(name)?]);
         Some([value("wall")?, value("position")?, value("length_m")?])
     }
 
     /// Whether it is the same effect at another one of the sensors.
     pub(super) fn is_at_other_sensor(&self, other: &Self) -> bool {
-        let sensor = |probe: &Self| {
-            let index = probe
-                .spec
-                .params
-                .iter()
-                .position(|param| param.name == "sensor")?;
-            Some(probe.origin[index])
-        };
+        let sensor = |probe: &Self| Some(probe.origin[probe.spec.place_of("sensor")?]);
         self.spec == other.spec && sensor(self) != sensor(other)
     }
 
@@ -172,6 +162,11 @@ impl Probe {
             .zip(&self.direction)
             .map(|(o, d)| o + d * (size - self.neutral))
             .collect()
+    }
+
+    /// A size so many times as far from nothing as another.
+    pub(super) fn times(&self, size: f64, multiple: f64) -> f64 {
+        self.neutral + multiple * (size - self.neutral)
     }
 
     /// The effect at a size.
@@ -222,12 +217,7 @@ fn line(name: &str, sizes: &[f64]) -> Vec<Probe> {
 /// parameters that a fit may change, with their steps.
 fn probe(name: &str, fixed: &[(&str, f64)], sizes: &[f64], free: &[(&str, f64)]) -> Vec<Probe> {
     let Ok(spec) = find(name) else { return Vec::new() };
-    let index = |key: &str| {
-        spec.params
-            .iter()
-            .position(|p| p.name == key)
-            .expect("probes name parameters")
-    };
+    let index = |key: &str| spec.place_of(key).expect("probes name parameters");
     let size_index = spec
         .params
         .iter()
@@ -271,14 +261,7 @@ fn vector(name: &str, keys: [&str; 2], sizes: &[f64]) -> Vec<Probe> {
     let mut probes = Vec::new();
     for (a, b) in [(1.0, 0.0), (h, h), (0.0, 1.0), (-h, h)] {
         for mut probe in probe(name, &[], sizes, &[]) {
-            let index = |key: &str| {
-                probe
-                    .spec
-                    .params
-                    .iter()
-                    .position(|p| p.name == key)
-                    .expect("probes name parameters")
-            };
+            let index = |key: &str| probe.spec.place_of(key).expect("probes name parameters");
             let (i, j) = (index(keys[0]), index(keys[1]));
             probe.direction.fill(0.0);
             (probe.direction[i], probe.direction[j]) = (a, b);

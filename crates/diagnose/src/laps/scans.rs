@@ -7,13 +7,16 @@ use rayon::prelude::*;
 use sim::Setting;
 
 use super::atlas::{Atlas, White};
-use super::beside::{Base, best_multiple};
+use super::beside::{Base, difference, explains};
 use super::hunt::{Hunt, Look};
 use super::hypothesis::{Hypothesis, Part, Shape};
 use super::pairs::{Columns, Piece};
 use super::refine::Descent;
 use super::search::{BASES, Found, ROUNDS_OF_SEVERAL, Search, near, sort};
 use super::trial::Trial;
+
+/// Pairs with an effect that jumps that are simulated before the best few are tried.
+const HEARD: usize = 8;
 
 /// What a probe that jumps leaves of the data beside a base at sizes all over its range.
 #[derive(Debug, Clone)]
@@ -111,10 +114,7 @@ impl Trial<'_> {
         /// Share of the size to either side.
         const REACH: f64 = 0.004;
         let nothing = self.atlas.at_rest(Hypothesis::nothing());
-        let left = |settings: &[Setting]| -> Option<[White; 2]> {
-            let [one, other] = SETS.map(|sets| self.left_beside(&nothing, settings, sets));
-            Some([one?, other?])
-        };
+        let left = |settings: &[Setting]| self.left_twice(&nothing, settings, &SETS);
         let jumping = self.atlas.probes[probe].setting(size);
         let Some(alone) = left(std::slice::from_ref(&jumping)) else {
             return Vec::new();
@@ -124,18 +124,15 @@ impl Trial<'_> {
         let before = self.left_beyond(&nothing, &self.atlas.null).norm_squared();
         let best_about = |&(other, other_size): &(usize, f64)| {
             let beside = left(&[jumping.clone(), self.atlas.probes[other].setting(other_size)])?;
-            let [a, b] = [0, 1].map(|i| &alone[i] - &beside[i]);
-            let square = a.dot(&b);
+            let action = difference(&alone, &beside);
             let at_look = |look: &Look| {
-                let product = 0.5 * (look.left[0].dot(&b) + look.left[1].dot(&a));
-                let (multiple, gain) = best_multiple(product, square);
-                let neutral = self.atlas.probes[other].neutral;
+                let (multiple, gain) = explains(&action, &look.left);
                 Beside {
                     score: self
                         .atlas
                         .score_of_pair([probe, other], 0.5 * (before - look.square()) + gain),
                     other,
-                    other_size: neutral + multiple * (other_size - neutral),
+                    other_size: self.atlas.probes[other].times(other_size, multiple),
                     jumping: probe,
                     size: look.size,
                     spacing: look.size * (ratio - 1.0),
@@ -272,7 +269,6 @@ impl Search<'_> {
     /// The most promising pairs of an effect that jumps and one that does not. What both do is taken to add up: no single effect need
     /// come near.
     pub(super) fn screened_pairs_that_jump(&self) -> Vec<Beside> {
-        const HEARD: usize = 8;
         self.atlas()
             .screen_beside_scans(self.residual, self.scanned(), HEARD)
     }
@@ -280,7 +276,6 @@ impl Search<'_> {
     /// A single effect that jumps with what goes best with it at sizes close about its own: another effect beside which that does not
     /// show may have had a share in it.
     pub(super) fn pairs_about(&self, single: &Found) -> Vec<Hypothesis> {
-        const HEARD: usize = 8;
         match single.hypothesis.parts.as_slice() {
             [part] if part.held.is_some() => {
                 self.tell(format_args!("sizes about that of {}", single.explanation.label()));

@@ -289,17 +289,15 @@ impl Search<'_> {
         for near in found.iter().take(MOST).filter(|found| score(found) > best - NEAR) {
             for (i, part) in near.hypothesis.parts.iter().enumerate() {
                 let rest = near.hypothesis.without(i);
-                let others = part.at_other_sensors(self.atlas()).into_iter();
-                starts.extend(others.map(|other| rest.with(&Hypothesis::of(other))));
+                for other in part.at_other_sensors(self.atlas()) {
+                    let start = rest.with(&Hypothesis::of(other));
+                    let mut known = found.iter().map(|found| &found.hypothesis).chain(&starts);
+                    if !known.any(|known| known.probes() == start.probes()) {
+                        starts.push(start);
+                    }
+                }
             }
         }
-        let mut known: Vec<Vec<usize>> = found.iter().map(|found| found.hypothesis.probes()).collect();
-        starts.retain(|start| {
-            let probes = start.probes();
-            let new = !known.contains(&probes);
-            known.push(probes);
-            new
-        });
         self.settle(self.descend(starts.iter(), &ROUNDS, best))
     }
 

@@ -10,6 +10,7 @@ use super::evidence::Evidence;
 use super::leads::{By, tail};
 use super::refined::Refined;
 use super::repeat::repeats;
+use crate::slip::memory_of;
 
 /// The effects on noise.
 const NOISES: [&str; 3] = ["slip-level", "camera-noise", "reading-noise"];
@@ -205,22 +206,20 @@ impl Factor {
     }
 }
 
-/// An answer that holds a larger slip level, with slip that has a memory instead: over more than a few physics steps, correlation a
-/// of one step's slip with the last one's adds as much to the pose's covariance as a level of sqrt((1 + a) / (1 - a)), and the
-/// filter, which takes slip to be white, does not tell them apart. `None` for other answers.
+/// An answer that holds a larger slip level, with slip that has a memory instead ([`memory_of`]): it adds as much to the pose's
+/// covariance, and the filter, which takes slip to be white, does not tell them apart. `None` for other answers.
 pub(crate) fn with_memory(answer: &Refined) -> Option<Refined> {
     let place = answer.settings.iter().position(|s| s.spec.name == "slip-level")?;
     let Pattern::Constant(values) = &answer.settings[place].pattern else {
         return None;
     };
-    let square = values[0] * values[0];
-    if square <= 1.0 {
+    let correlation = memory_of(values[0]);
+    if correlation <= 0.0 {
         return None;
     }
     let mut twin = answer.clone();
-    let correlation = (square - 1.0) / (square + 1.0);
     twin.settings[place] = Setting::constant(find("slip-memory").ok()?, [correlation]);
-    twin.standard_errors[place][0] *= 4.0 * values[0] / (square + 1.0).powi(2);
+    twin.standard_errors[place][0] *= 4.0 * values[0] / (values[0].powi(2) + 1.0).powi(2);
     Some(twin)
 }
 

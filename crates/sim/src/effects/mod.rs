@@ -183,6 +183,11 @@ impl Spec {
         self.params.get(place).or(self.list.as_ref())
     }
 
+    /// The place of a parameter's value by its name.
+    pub fn place_of(&self, name: &str) -> Option<usize> {
+        self.params.iter().position(|param| param.name == name)
+    }
+
     /// Whether its one parameter is a rate of change in the course of a run.
     pub fn drifts(&self) -> bool {
         matches!(self.params, [Param { name: "per_s", .. }])
