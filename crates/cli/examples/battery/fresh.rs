@@ -11,6 +11,7 @@ use sim::{Stream, Streams};
 use toml::{Table, Value};
 
 use crate::classes::are_one;
+use crate::further::FURTHER;
 use crate::labels::{self, Controller, Kind, Label, Level, Set, Truth};
 use crate::program::Lapwing;
 use crate::recipes::{BY_RUN, RECIPES, Recipe};
@@ -44,13 +45,62 @@ pub(crate) fn sets(
     count: u64,
     wanted: &dyn Fn(&str) -> bool,
 ) -> Result<Vec<Set>> {
-    let folder = lapwing.out.join(format!("fresh-{seed}"));
+    drawn(lapwing, seed, plans(count as usize), &undeclared::KINDS, wanted)
+}
+
+/// The first `count` sets of a seed with effects of no list of further kinds.
+///
+/// # Errors
+/// As of [`sets`].
+pub(crate) fn further(
+    lapwing: &Lapwing,
+    seed: u64,
+    count: u64,
+    wanted: &dyn Fn(&str) -> bool,
+) -> Result<Vec<Set>> {
+    drawn(lapwing, seed, further_plans(count as usize), &FURTHER, wanted)
+}
+
+/// Every kind by laps of both robots and by a log of either, in turn.
+fn further_plans(count: usize) -> Vec<Plan> {
+    let plan = |number: usize| {
+        let (round, place) = (number / FURTHER.len(), number % FURTHER.len());
+        Plan {
+            kind: Kind::Outside,
+            by_run: false,
+            level: if round % 3 == 2 { Level::L2 } else { Level::L1 },
+            controller: if (round + place) % 2 == 1 {
+                Controller::RuleBased
+            } else {
+                Controller::Braitenberg
+            },
+            nth: number,
+        }
+    };
+    (0..count).map(plan).collect()
+}
+
+/// Sets by plan.
+fn drawn(
+    lapwing: &Lapwing,
+    seed: u64,
+    plans: Vec<Plan>,
+    kinds: &[undeclared::Kind],
+    wanted: &dyn Fn(&str) -> bool,
+) -> Result<Vec<Set>> {
+    let (group, initial) = if plans.iter().all(|plan| plan.kind == Kind::Outside) {
+        ("further", 'u')
+    } else {
+        ("fresh", 'f')
+    };
+    let folder = lapwing.out.join(format!("{group}-{seed}"));
     let mut deck = Deck::new(seed);
     fs::create_dir_all(&folder).with_context(|| format!("{}: cannot be made", folder.display()))?;
+    let count = plans.len();
     let mut sets = Vec::new();
-    for (number, plan) in plans(count as usize).into_iter().enumerate() {
+    for (number, plan) in plans.into_iter().enumerate() {
         let recipes = deck.take(plan);
-        let name = format!("f{seed}-{number:03}");
+        let name = format!("{initial}{seed}-{number:03}");
         if !wanted(&name) {
             continue;
         }
@@ -61,11 +111,11 @@ pub(crate) fn sets(
             .map(|kept| kept.label);
         let label = match known {
             Some(label) => label,
-            None => made(lapwing, seed, number as u64, plan, &recipes, &name, &place)?,
+            None => made(lapwing, seed, number as u64, plan, &recipes, kinds, &name, &place)?,
         };
         sets.push(Set { label, folder: place });
     }
-    if sets.len() as u64 == count {
+    if sets.len() == count {
         labels::write(&folder, sets.iter().map(|set| &set.label))?;
     }
     Ok(sets)
@@ -167,6 +217,7 @@ fn made(
     number: u64,
     plan: Plan,
     recipes: &[Recipe],
+    kinds: &[undeclared::Kind],
     name: &str,
     place: &Path,
 ) -> Result<Label> {
@@ -188,7 +239,12 @@ fn made(
         };
         let finished = if plan.kind == Kind::Outside {
             let scene = robot::scene()?;
-            let cause = undeclared::Cause::draw(plan.nth, scene.circuit(), &mut stream, shrink);
+            let draw = undeclared::Draw {
+                circuit: scene.circuit(),
+                stream: &mut stream,
+                shrink,
+            };
+            let cause = undeclared::Cause::draw(kinds, plan.nth, draw);
             label.effects.push(cause.setting.spec.name.to_owned());
             label.stages.push(cause.setting.spec.stage.name().to_owned());
             label.parameters = cause.parameters();

@@ -7,6 +7,7 @@
 mod classes;
 mod figures;
 mod fresh;
+mod further;
 mod labels;
 mod parameters;
 mod program;
@@ -37,6 +38,9 @@ struct Args {
     /// Number of fresh data sets; a larger number adds to those that are there
     #[arg(long, value_name = "N", default_value_t = 0)]
     fresh: u64,
+    /// Number of fresh data sets with effects of no list, of further kinds
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    further: u64,
     /// Only these data sets
     #[arg(long, value_name = "NAME", value_delimiter = ',')]
     only: Vec<String>,
@@ -54,8 +58,8 @@ struct Args {
 fn main() -> Result<()> {
     let args = Args::parse();
     ensure!(
-        args.practice.is_some() || args.fresh > 0,
-        "nothing to do: give --practice DIR, --fresh N or both"
+        args.practice.is_some() || args.fresh > 0 || args.further > 0,
+        "nothing to do: give --practice DIR, --fresh N, --further N"
     );
     let lapwing = Lapwing::built(&args.out)?;
     let wanted = |name: &str| args.only.is_empty() || args.only.iter().any(|only| only == name);
@@ -71,6 +75,13 @@ fn main() -> Result<()> {
             return Ok(());
         }
         batteries.push(judged(&lapwing, "fresh", sets)?);
+    }
+    if args.further > 0 {
+        let sets = fresh::further(&lapwing, args.seed, args.further, &wanted)?;
+        if args.sets_only {
+            return Ok(());
+        }
+        batteries.push(judged(&lapwing, "further", sets)?);
     }
     let text = report::markdown(&batteries, &lapwing.build);
     fs::write(args.out.join("battery.md"), &text).context("cannot write battery.md")?;

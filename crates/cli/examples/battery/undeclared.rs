@@ -67,13 +67,53 @@ static SENSOR_TEMPERATURE: Spec = Spec {
     build: || Box::new(SensorTemperature),
 };
 
-static KINDS: [&Spec; 5] = [
-    &SLIPPERY_AREA,
-    &WHEEL_ECCENTRICITY,
-    &STALLS,
-    &CAMERA_PERSPECTIVE,
-    &SENSOR_TEMPERATURE,
+/// A way to draw an effect of no list.
+pub(crate) type Kind = (&'static Spec, fn(&mut Draw<'_>) -> Vec<f64>);
+
+/// The kinds that fresh batteries hold.
+pub(crate) static KINDS: [Kind; 5] = [
+    (&SLIPPERY_AREA, |draw| {
+        let share = -draw.size(0.06, 0.25);
+        let place = draw.place();
+        vec![share, place.x, place.y]
+    }),
+    (&WHEEL_ECCENTRICITY, |draw| vec![draw.size(0.05, 0.2)]),
+    (&STALLS, |draw| vec![draw.size(0.01, 0.08)]),
+    (&CAMERA_PERSPECTIVE, |draw| {
+        let length = draw.size(0.01, 0.05);
+        let (sin, cos) = (std::f64::consts::PI * draw.stream.symmetric()).sin_cos();
+        vec![length * cos, length * sin]
+    }),
+    (&SENSOR_TEMPERATURE, |draw| {
+        let share = draw.size(0.06, 0.25);
+        vec![draw.sign() * share, log_uniform(draw.stream, 60.0, 300.0)]
+    }),
 ];
+
+/// What values are drawn with.
+pub(crate) struct Draw<'a> {
+    pub(crate) circuit: &'a Circuit,
+    pub(crate) stream: &'a mut Stream,
+    /// A factor on sizes.
+    pub(crate) shrink: f64,
+}
+
+impl Draw<'_> {
+    /// A size, log-uniform.
+    pub(crate) fn size(&mut self, low: f64, high: f64) -> f64 {
+        self.shrink * log_uniform(self.stream, low, high)
+    }
+
+    /// 1 or -1.
+    pub(crate) fn sign(&mut self) -> f64 {
+        if self.stream.symmetric() > 0.0 { 1.0 } else { -1.0 }
+    }
+
+    /// The middle of one of the gates, m.
+    fn place(&mut self) -> Vec2 {
+        self.circuit.gates[self.stream.index(self.circuit.gates.len())].center
+    }
+}
 
 #[derive(Debug)]
 struct SlipperyArea;
@@ -105,15 +145,24 @@ struct Stalls;
 
 impl Effect for Stalls {
     fn drive(&mut self, values: &[f64], now: &Moment, wheels: WheelSpeeds) -> WheelSpeeds {
-        // Where the robot is to the last bit, and when, is as good as a draw.
-        let place = now.pose.position.x.to_bits() ^ now.pose.position.y.to_bits().rotate_left(32);
-        let draw = |wheel: u64| mixed(place ^ now.time_s.to_bits().rotate_left(16) ^ wheel);
-        let kept = |wheel, speed| if draw(wheel) < values[0] { 0.0 } else { speed };
+        let kept = |wheel, speed| {
+            if draw_of(now, wheel) < values[0] {
+                0.0
+            } else {
+                speed
+            }
+        };
         WheelSpeeds {
             left_m_s: kept(1, wheels.left_m_s),
             right_m_s: kept(2, wheels.right_m_s),
         }
     }
+}
+
+/// A number in [0, 1) that is another one at every moment: where the robot is to the last bit, and when, is as good as a draw.
+pub(crate) fn draw_of(now: &Moment, nth: u64) -> f64 {
+    let place = now.pose.position.x.to_bits() ^ now.pose.position.y.to_bits().rotate_left(32);
+    mixed(place ^ now.time_s.to_bits().rotate_left(16) ^ nth)
 }
 
 /// A number in [0, 1) that depends on every bit (the finisher of splitmix64).
@@ -152,29 +201,10 @@ pub(crate) struct Cause {
 }
 
 impl Cause {
-    /// The kinds in turn, each size log-uniform, times `shrink`; places are gates of the circuit.
-    pub(crate) fn draw(turn: usize, circuit: &Circuit, stream: &mut Stream, shrink: f64) -> Self {
-        let spec = KINDS[turn % KINDS.len()];
-        let mut size = |low, high| shrink * log_uniform(stream, low, high);
-        let values = match spec.name {
-            "slippery-area" => {
-                let share = -size(0.06, 0.25);
-                let place = circuit.gates[stream.index(circuit.gates.len())].center;
-                vec![share, place.x, place.y]
-            }
-            "wheel-eccentricity" => vec![size(0.05, 0.2)],
-            "stalls" => vec![size(0.01, 0.08)],
-            "camera-perspective" => {
-                let length = size(0.01, 0.05);
-                let (sin, cos) = (std::f64::consts::PI * stream.symmetric()).sin_cos();
-                vec![length * cos, length * sin]
-            }
-            _ => {
-                let share = size(0.06, 0.25);
-                let up = if stream.symmetric() > 0.0 { 1.0 } else { -1.0 };
-                vec![up * share, log_uniform(stream, 60.0, 300.0)]
-            }
-        };
+    /// The kinds in turn.
+    pub(crate) fn draw(kinds: &[Kind], turn: usize, mut draw: Draw<'_>) -> Self {
+        let (spec, values) = kinds[turn % kinds.len()];
+        let values = values(&mut draw);
         let values: Vec<f64> = values.into_iter().map(rounded).collect();
         Self {
             setting: Setting::constant(spec, values.clone()),
@@ -196,6 +226,7 @@ mod tests {
     use sim::{Streams, drive};
 
     use super::*;
+    use crate::further::FURTHER;
     use crate::labels::Controller;
     use crate::robot::{declared, scene};
 
@@ -209,12 +240,17 @@ mod tests {
             let world = scene.world(&model, 0).unwrap();
             let mut steps = Vec::new();
             let record = |step: &sim::Step| steps.push(step.observed);
-            drive(&world, Streams { seed: 1, run: 0 }, 1, record).unwrap();
+            drive(&world, Streams { seed: 1, run: 0 }, 5, record).unwrap();
             steps
         };
         let without = seen(Vec::new());
-        for turn in 0..KINDS.len() {
-            let setting = Cause::draw(turn, scene.circuit(), &mut stream, 1.0).setting;
+        for kind in KINDS.iter().chain(&FURTHER) {
+            let draw = Draw {
+                circuit: scene.circuit(),
+                stream: &mut stream,
+                shrink: 1.0,
+            };
+            let setting = Cause::draw(&[*kind], 0, draw).setting;
             assert!(sim::find(setting.spec.name).is_err(), "{}", setting.spec.name);
             setting.check(0).unwrap();
             assert_ne!(seen(vec![setting]), without);
