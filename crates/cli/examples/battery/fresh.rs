@@ -11,7 +11,7 @@ use sim::{Stream, Streams};
 use toml::{Table, Value};
 
 use crate::classes::are_one;
-use crate::further::FURTHER;
+use crate::further;
 use crate::labels::{self, Controller, Kind, Label, Level, Set, Truth};
 use crate::program::Lapwing;
 use crate::recipes::{BY_RUN, RECIPES, Recipe};
@@ -35,72 +35,52 @@ struct Plan {
     nth: usize,
 }
 
+/// A sequence of sets to be drawn.
+#[derive(Debug)]
+pub(crate) struct Sequence {
+    /// Its sets are in the folder `NAME-SEED`.
+    pub(crate) name: &'static str,
+    /// With what its sets' names begin.
+    initial: char,
+    /// The effects of no list in it.
+    kinds: &'static [undeclared::Kind],
+    plans: fn(usize) -> Vec<Plan>,
+}
+
+/// In the proportions of the practice sets.
+pub(crate) static FRESH: Sequence = Sequence {
+    name: "fresh",
+    initial: 'f',
+    kinds: &undeclared::KINDS,
+    plans,
+};
+
+/// Effects of no list of further kinds.
+pub(crate) static FURTHER: Sequence = Sequence {
+    name: "further",
+    initial: 'u',
+    kinds: &further::KINDS,
+    plans: further_plans,
+};
+
 /// The first `count` sets of a seed that are wanted; those that are not on disk are driven.
 ///
 /// # Errors
 /// A model that the program refuses, a file that cannot be written.
 pub(crate) fn sets(
     lapwing: &Lapwing,
+    sequence: &Sequence,
     seed: u64,
     count: u64,
     wanted: &dyn Fn(&str) -> bool,
 ) -> Result<Vec<Set>> {
-    drawn(lapwing, seed, plans(count as usize), &undeclared::KINDS, wanted)
-}
-
-/// The first `count` sets of a seed with effects of no list of further kinds.
-///
-/// # Errors
-/// As of [`sets`].
-pub(crate) fn further(
-    lapwing: &Lapwing,
-    seed: u64,
-    count: u64,
-    wanted: &dyn Fn(&str) -> bool,
-) -> Result<Vec<Set>> {
-    drawn(lapwing, seed, further_plans(count as usize), &FURTHER, wanted)
-}
-
-/// Every kind by laps of both robots and by a log of either, in turn.
-fn further_plans(count: usize) -> Vec<Plan> {
-    let plan = |number: usize| {
-        let (round, place) = (number / FURTHER.len(), number % FURTHER.len());
-        Plan {
-            kind: Kind::Outside,
-            by_run: false,
-            level: if round % 3 == 2 { Level::L2 } else { Level::L1 },
-            controller: if (round + place) % 2 == 1 {
-                Controller::RuleBased
-            } else {
-                Controller::Braitenberg
-            },
-            nth: number,
-        }
-    };
-    (0..count).map(plan).collect()
-}
-
-/// Sets by plan.
-fn drawn(
-    lapwing: &Lapwing,
-    seed: u64,
-    plans: Vec<Plan>,
-    kinds: &[undeclared::Kind],
-    wanted: &dyn Fn(&str) -> bool,
-) -> Result<Vec<Set>> {
-    let (group, initial) = if plans.iter().all(|plan| plan.kind == Kind::Outside) {
-        ("further", 'u')
-    } else {
-        ("fresh", 'f')
-    };
-    let folder = lapwing.out.join(format!("{group}-{seed}"));
+    let folder = lapwing.out.join(format!("{}-{seed}", sequence.name));
     let mut deck = Deck::new(seed);
     fs::create_dir_all(&folder).with_context(|| format!("{}: cannot be made", folder.display()))?;
-    let count = plans.len();
     let mut sets = Vec::new();
-    for (number, plan) in plans.into_iter().enumerate() {
+    for (number, plan) in (sequence.plans)(count as usize).into_iter().enumerate() {
         let recipes = deck.take(plan);
-        let name = format!("{initial}{seed}-{number:03}");
+        let name = format!("{}{seed}-{number:03}", sequence.initial);
         if !wanted(&name) {
             continue;
         }
@@ -111,11 +91,19 @@ fn drawn(
             .map(|kept| kept.label);
         let label = match known {
             Some(label) => label,
-            None => made(lapwing, seed, number as u64, plan, &recipes, kinds, &name, &place)?,
+            None => made(
+                lapwing,
+                seed,
+                number as u64,
+                plan,
+                &recipes,
+                sequence.kinds,
+                &place,
+            )?,
         };
         sets.push(Set { label, folder: place });
     }
-    if sets.len() == count {
+    if sets.len() as u64 == count {
         labels::write(&folder, sets.iter().map(|set| &set.label))?;
     }
     Ok(sets)
@@ -151,6 +139,25 @@ fn plans(count: usize) -> Vec<Plan> {
                 Controller::Braitenberg
             },
             nth,
+        }
+    };
+    (0..count).map(plan).collect()
+}
+
+/// Every kind of effect of no list by laps of both robots, then by logs, in turn.
+fn further_plans(count: usize) -> Vec<Plan> {
+    let plan = |number: usize| {
+        let (round, place) = (number / further::KINDS.len(), number % further::KINDS.len());
+        Plan {
+            kind: Kind::Outside,
+            by_run: false,
+            level: if round % 3 == 2 { Level::L2 } else { Level::L1 },
+            controller: if (round + place) % 2 == 1 {
+                Controller::RuleBased
+            } else {
+                Controller::Braitenberg
+            },
+            nth: number,
         }
     };
     (0..count).map(plan).collect()
@@ -218,9 +225,10 @@ fn made(
     plan: Plan,
     recipes: &[Recipe],
     kinds: &[undeclared::Kind],
-    name: &str,
     place: &Path,
 ) -> Result<Label> {
+    let name = place.file_name().and_then(|name| name.to_str());
+    let name = name.context("a set has a name")?;
     let mut stream = Streams { seed, run: number }.open("battery set");
     let laps = if plan.level == Level::L1 { 20 } else { 5 };
     for attempt in 0..ATTEMPTS {

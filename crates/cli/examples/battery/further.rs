@@ -140,7 +140,7 @@ static SHEAR: Spec = spec(
 );
 
 /// The kinds.
-pub(crate) static FURTHER: [Kind; 14] = [
+pub(crate) static KINDS: [Kind; 14] = [
     (&SATURATION, |draw| vec![draw.size(0.05, 0.3)]),
     (&LATE_DECISIONS, |draw| vec![draw.size(0.05, 0.4)]),
     (&BACKLASH, |draw| vec![draw.size(0.001, 0.006)]),

@@ -69,19 +69,16 @@ fn main() -> Result<()> {
         sets.retain(|set| wanted(&set.label.name));
         batteries.push(judged(&lapwing, "practice", sets)?);
     }
-    if args.fresh > 0 {
-        let sets = fresh::sets(&lapwing, args.seed, args.fresh, &wanted)?;
-        if args.sets_only {
-            return Ok(());
+    for (sequence, count) in [(&fresh::FRESH, args.fresh), (&fresh::FURTHER, args.further)] {
+        if count > 0 {
+            let sets = fresh::sets(&lapwing, sequence, args.seed, count, &wanted)?;
+            if !args.sets_only {
+                batteries.push(judged(&lapwing, sequence.name, sets)?);
+            }
         }
-        batteries.push(judged(&lapwing, "fresh", sets)?);
     }
-    if args.further > 0 {
-        let sets = fresh::further(&lapwing, args.seed, args.further, &wanted)?;
-        if args.sets_only {
-            return Ok(());
-        }
-        batteries.push(judged(&lapwing, "further", sets)?);
+    if args.sets_only {
+        return Ok(());
     }
     let text = report::markdown(&batteries, &lapwing.build);
     fs::write(args.out.join("battery.md"), &text).context("cannot write battery.md")?;

@@ -226,7 +226,7 @@ mod tests {
     use sim::{Streams, drive};
 
     use super::*;
-    use crate::further::FURTHER;
+    use crate::further;
     use crate::labels::Controller;
     use crate::robot::{declared, scene};
 
@@ -244,7 +244,7 @@ mod tests {
             steps
         };
         let without = seen(Vec::new());
-        for kind in KINDS.iter().chain(&FURTHER) {
+        for kind in KINDS.iter().chain(&further::KINDS) {
             let draw = Draw {
                 circuit: scene.circuit(),
                 stream: &mut stream,
