@@ -30,6 +30,11 @@ const ENOUGH: f64 = 0.98;
 const ALL_BUT: f64 = 0.995;
 /// Share that several effects, or one without a name, must explain to be claimed in part.
 const MOST: f64 = 0.9;
+/// What an explanation that is claimed in part may leave, as a multiple of what chance makes of it.
+const FAR: f64 = 20.0;
+/// The same of names that leave more than faults of the model: right ones of robots with up to three effects leave at most 2.3 times
+/// as much, backlash and sensors that see less far under other names three to six times.
+const FAR_BY_NAME: f64 = 3.0;
 /// Share up to which an explanation does not stand that leaves what is not likely, be it not significant: of weak signals chance
 /// alone explains as much.
 const TOO_LITTLE: f64 = 0.7;
@@ -368,8 +373,13 @@ fn verdict_of(best: &Explanation) -> Verdict {
         1 => ENOUGH,
         _ => MOST,
     };
-    let leaves_too_much = best.remainder.is_some_and(|left| left.are_far_beyond_chance());
-    if best.share >= enough && !leaves_too_much {
+    let few_enough = if best.has_no_name() || best.share >= ALL_BUT_FAULTS {
+        FAR
+    } else {
+        FAR_BY_NAME
+    };
+    let left = best.remainder.map_or(0.0, |left| left.times_chance());
+    if best.share >= enough && left <= few_enough {
         Verdict::PartlyExplained
     } else {
         Verdict::Unexplained
@@ -502,6 +512,7 @@ mod tests {
 
     use super::*;
     use crate::Candidate;
+    use crate::laps::tests_of_fit::Quadratic;
 
     /// An explanation by some names that leaves what has a probability, with its share of the excess and its score.
     fn by(names: &[&str], remainder_p: f64, share: f64, score: f64) -> Explanation {
@@ -553,6 +564,36 @@ mod tests {
                 Verdict::Unexplained
             };
             assert_eq!(verdict, expected, "{names:?} {p} {share} {score}");
+        }
+    }
+
+    #[test]
+    fn names_that_leave_several_times_what_chance_does_are_not_claimed() {
+        let leaving = |times: f64, share: f64| {
+            let quadratic = |freedom: usize| Quadratic::new(times * freedom as f64, freedom);
+            let remainder = FourNumbers {
+                mean: quadratic(120),
+                runs: quadratic(360),
+                trend: quadratic(120),
+                noise: quadratic(21),
+            };
+            Explanation {
+                remainder: Some(remainder),
+                ..by(&["wheel-scale", "reading-gain"], 1e-30, share, 5000.0)
+            }
+        };
+        for (times, share, claimed) in [
+            (2.5, 0.98, true),
+            (3.5, 0.98, false),
+            (3.5, 0.9995, true),
+            (25.0, 0.9995, false),
+        ] {
+            let verdict = verdict_of(&leaving(times, share));
+            assert_eq!(
+                verdict == Verdict::PartlyExplained,
+                claimed,
+                "{times} {share} {verdict:?}"
+            );
         }
     }
 

@@ -118,11 +118,10 @@ impl FourNumbers {
         self.together().p > OFTEN_P
     }
 
-    /// Whether all four together are so much more than chance that no share of anything larger makes up for it.
-    pub(crate) fn are_far_beyond_chance(&self) -> bool {
-        const FAR: f64 = 20.0;
+    /// All four together as a multiple of what chance makes of them.
+    pub(crate) fn times_chance(&self) -> f64 {
         let Quadratic { q, freedom, .. } = self.together();
-        q > FAR * freedom as f64
+        q / freedom as f64
     }
 
     /// Probability that the smallest of the four is as small as it is: four times that (Bonferroni).
