@@ -17,6 +17,13 @@ pub struct Channel {
     pub correlation: f64,
 }
 
+impl Channel {
+    /// What a first-order autoregression gains in log-likelihood over white innovations: -n/2 log(1 - r^2).
+    pub(super) fn gain_of_memory(&self) -> f64 {
+        -0.5 * self.count as f64 * (-self.correlation.powi(2)).ln_1p()
+    }
+}
+
 /// Moments of the innovations.
 pub(super) fn channels(traces: &[(World<'_>, Trace)]) -> [Channel; MEASURED] {
     std::array::from_fn(|m| {
