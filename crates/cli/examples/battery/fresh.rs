@@ -91,15 +91,14 @@ pub(crate) fn sets(
             .map(|kept| kept.label);
         let label = match known {
             Some(label) => label,
-            None => made(
-                lapwing,
-                seed,
-                number as u64,
-                plan,
-                &recipes,
-                sequence.kinds,
-                &place,
-            )?,
+            None => {
+                let streams = Streams {
+                    seed,
+                    run: number as u64,
+                };
+                let kind = &sequence.kinds[plan.nth % sequence.kinds.len()];
+                made(lapwing, streams, plan, &recipes, kind, &name, &place)?
+            }
         };
         sets.push(Set { label, folder: place });
     }
@@ -220,21 +219,19 @@ impl Deck {
 /// Drives one set, with ever smaller effects until the robot finishes its laps.
 fn made(
     lapwing: &Lapwing,
-    seed: u64,
-    number: u64,
+    streams: Streams,
     plan: Plan,
     recipes: &[Recipe],
-    kinds: &[undeclared::Kind],
+    kind: &undeclared::Kind,
+    name: &str,
     place: &Path,
 ) -> Result<Label> {
-    let name = place.file_name().and_then(|name| name.to_str());
-    let name = name.context("a set has a name")?;
-    let mut stream = Streams { seed, run: number }.open("battery set");
+    let mut stream = streams.open("battery set");
     let laps = if plan.level == Level::L1 { 20 } else { 5 };
     for attempt in 0..ATTEMPTS {
         let shrink = SHRINK.powi(attempt);
         // Far from the seeds that a user's drives and fits have.
-        let drive_seed = (1 << 32) + (seed << 20) + (number << 4) + attempt as u64;
+        let drive_seed = (1 << 32) + (streams.seed << 20) + (streams.run << 4) + attempt as u64;
         let mut label = Label {
             name: name.to_owned(),
             level: plan.level,
@@ -252,7 +249,7 @@ fn made(
                 stream: &mut stream,
                 shrink,
             };
-            let cause = undeclared::Cause::draw(kinds, plan.nth, draw);
+            let cause = undeclared::Cause::draw(kind, draw);
             label.effects.push(cause.setting.spec.name.to_owned());
             label.stages.push(cause.setting.spec.stage.name().to_owned());
             label.parameters = cause.parameters();
@@ -347,6 +344,18 @@ mod tests {
         let rule_based = count(&|plan| plan.controller == Controller::RuleBased);
         assert!((40..=50).contains(&logged), "{logged} of 200 with a log");
         assert!((45..=55).contains(&rule_based), "{rule_based} of 200 rule-based");
+    }
+
+    #[test]
+    fn every_further_kind_is_seen_by_laps_of_both_robots_and_by_a_log() {
+        let kinds = further::KINDS.len();
+        let all = further_plans(3 * kinds);
+        for kind in 0..kinds {
+            let own: Vec<&Plan> = all.iter().filter(|plan| plan.nth % kinds == kind).collect();
+            let levels: Vec<Level> = own.iter().map(|plan| plan.level).collect();
+            assert_eq!(levels, [Level::L1, Level::L1, Level::L2]);
+            assert_ne!(own[0].controller, own[1].controller);
+        }
     }
 
     #[test]

@@ -5,25 +5,7 @@ use std::f64::consts::TAU;
 use sim::{Effect, Hit, Machine, Moment, Param, Readings, Site, Spec, Stage, Twist, Vec2, WheelSpeeds};
 use track::Side;
 
-use crate::recipes::log_uniform;
-use crate::undeclared::{Kind, draw_of};
-
-const fn spec(
-    name: &'static str,
-    stage: Stage,
-    summary: &'static str,
-    params: &'static [Param],
-    build: fn() -> Box<dyn Effect>,
-) -> Spec {
-    Spec {
-        name,
-        stage,
-        summary,
-        params,
-        list: None,
-        build,
-    }
-}
+use crate::undeclared::{Kind, draw_of, spec};
 
 static SATURATION: Spec = spec(
     "reading-saturation",
@@ -154,21 +136,13 @@ pub(crate) static KINDS: [Kind; 14] = [
     (&SLOW_TURNS, |draw| vec![draw.size(0.01, 0.08)]),
     (&SHEAR, |draw| vec![draw.sign() * draw.size(0.002, 0.02)]),
     (&SHORT_SIGHT, |draw| {
-        let sensor = [1.0, 2.0, 5.0, 6.0][draw.stream.index(4)];
-        vec![sensor, 0.1 * (1.0 - draw.size(0.2, 0.6))]
+        vec![draw.sensor(), 0.1 * (1.0 - draw.size(0.2, 0.6))]
     }),
-    (&RUN_IN, |draw| {
-        let share = draw.size(0.01, 0.1);
-        vec![share, log_uniform(draw.stream, 60.0, 300.0)]
-    }),
+    (&RUN_IN, |draw| vec![draw.size(0.01, 0.1), draw.time_s()]),
     (&MOTOR_CURVE, |draw| vec![draw.sign() * draw.size(0.03, 0.3)]),
-    (&HAIR, |draw| {
-        let share = draw.size(0.003, 0.03);
-        vec![share, log_uniform(draw.stream, 60.0, 300.0)]
-    }),
+    (&HAIR, |draw| vec![draw.size(0.003, 0.03), draw.time_s()]),
     (&BENT, |draw| {
-        let sensor = [1.0, 2.0, 5.0, 6.0][draw.stream.index(4)];
-        vec![sensor, draw.sign() * draw.size(0.1, 0.4)]
+        vec![draw.sensor(), draw.sign() * draw.size(0.1, 0.4)]
     }),
 ];
 

@@ -7,65 +7,78 @@ use sim::{
 use crate::labels::Truth;
 use crate::recipes::{log_uniform, rounded};
 
+/// What the program must know to drive a robot with an effect.
+pub(crate) const fn spec(
+    name: &'static str,
+    stage: Stage,
+    summary: &'static str,
+    params: &'static [Param],
+    build: fn() -> Box<dyn Effect>,
+) -> Spec {
+    Spec {
+        name,
+        stage,
+        summary,
+        params,
+        list: None,
+        build,
+    }
+}
+
 /// A part of the floor on which both wheels slip: speeds times 1 + share * a Gaussian of 0.15 m about a place.
-static SLIPPERY_AREA: Spec = Spec {
-    name: "slippery-area",
-    stage: Stage::Act,
-    summary: "wheels slower on one part of the floor",
-    params: &[
+static SLIPPERY_AREA: Spec = spec(
+    "slippery-area",
+    Stage::Act,
+    "wheels slower on one part of the floor",
+    &[
         Param::new("share", "", 0.0, -0.9, 0.9),
         Param::place("x_m", "m", -10.0, 10.0),
         Param::place("y_m", "m", -10.0, 10.0),
     ],
-    list: None,
-    build: || Box::new(SlipperyArea),
-};
+    || Box::new(SlipperyArea),
+);
 
 /// A wheel out of round: its speed times 1 + share * cos of its own angle.
-static WHEEL_ECCENTRICITY: Spec = Spec {
-    name: "wheel-eccentricity",
-    stage: Stage::Act,
-    summary: "the left wheel's speed depends on its angle",
-    params: &[Param::new("share", "", 0.0, -0.9, 0.9)],
-    list: None,
-    build: || Box::<Wheel>::default(),
-};
+static WHEEL_ECCENTRICITY: Spec = spec(
+    "wheel-eccentricity",
+    Stage::Act,
+    "the left wheel's speed depends on its angle",
+    &[Param::new("share", "", 0.0, -0.9, 0.9)],
+    || Box::<Wheel>::default(),
+);
 
 /// Each wheel stands still for a physics step with this probability.
-static STALLS: Spec = Spec {
-    name: "stalls",
-    stage: Stage::Act,
-    summary: "wheels miss steps at random",
-    params: &[Param::new("probability", "", 0.0, 0.0, 1.0)],
-    list: None,
-    build: || Box::new(Stalls),
-};
+static STALLS: Spec = spec(
+    "stalls",
+    Stage::Act,
+    "wheels miss steps at random",
+    &[Param::new("probability", "", 0.0, 0.0, 1.0)],
+    || Box::new(Stalls),
+);
 
 /// A camera that looks at the floor at an angle: positions from the arena's middle times 1 + c . position.
-static CAMERA_PERSPECTIVE: Spec = Spec {
-    name: "camera-perspective",
-    stage: Stage::Observe,
-    summary: "positions shifted by a quadratic form",
-    params: &[
+static CAMERA_PERSPECTIVE: Spec = spec(
+    "camera-perspective",
+    Stage::Observe,
+    "positions shifted by a quadratic form",
+    &[
         Param::new("cx_per_m", "1/m", 0.0, -1.0, 1.0),
         Param::new("cy_per_m", "1/m", 0.0, -1.0, 1.0),
     ],
-    list: None,
-    build: || Box::new(CameraPerspective),
-};
+    || Box::new(CameraPerspective),
+);
 
 /// Sensors that warm up: readings times 1 + share * (1 - exp(-t / time)).
-static SENSOR_TEMPERATURE: Spec = Spec {
-    name: "sensor-temperature",
-    stage: Stage::Sense,
-    summary: "the sensors' gain settles after the start",
-    params: &[
+static SENSOR_TEMPERATURE: Spec = spec(
+    "sensor-temperature",
+    Stage::Sense,
+    "the sensors' gain settles after the start",
+    &[
         Param::new("share", "", 0.0, -0.9, 0.9),
         Param::place("time_s", "s", 1.0, 1e5),
     ],
-    list: None,
-    build: || Box::new(SensorTemperature),
-};
+    || Box::new(SensorTemperature),
+);
 
 /// A way to draw an effect of no list.
 pub(crate) type Kind = (&'static Spec, fn(&mut Draw<'_>) -> Vec<f64>);
@@ -86,7 +99,7 @@ pub(crate) static KINDS: [Kind; 5] = [
     }),
     (&SENSOR_TEMPERATURE, |draw| {
         let share = draw.size(0.06, 0.25);
-        vec![draw.sign() * share, log_uniform(draw.stream, 60.0, 300.0)]
+        vec![draw.sign() * share, draw.time_s()]
     }),
 ];
 
@@ -107,6 +120,16 @@ impl Draw<'_> {
     /// 1 or -1.
     pub(crate) fn sign(&mut self) -> f64 {
         if self.stream.symmetric() > 0.0 { 1.0 } else { -1.0 }
+    }
+
+    /// Some minutes, s.
+    pub(crate) fn time_s(&mut self) -> f64 {
+        log_uniform(self.stream, 60.0, 300.0)
+    }
+
+    /// One of the sensors that look ahead to a side or aside.
+    pub(crate) fn sensor(&mut self) -> f64 {
+        [1.0, 2.0, 5.0, 6.0][self.stream.index(4)]
     }
 
     /// The middle of one of the gates, m.
@@ -201,11 +224,9 @@ pub(crate) struct Cause {
 }
 
 impl Cause {
-    /// The kinds in turn.
-    pub(crate) fn draw(kinds: &[Kind], turn: usize, mut draw: Draw<'_>) -> Self {
-        let (spec, values) = kinds[turn % kinds.len()];
-        let values = values(&mut draw);
-        let values: Vec<f64> = values.into_iter().map(rounded).collect();
+    /// One of a kind.
+    pub(crate) fn draw((spec, values): &Kind, mut draw: Draw<'_>) -> Self {
+        let values: Vec<f64> = values(&mut draw).into_iter().map(rounded).collect();
         Self {
             setting: Setting::constant(spec, values.clone()),
             values,
@@ -250,7 +271,7 @@ mod tests {
                 stream: &mut stream,
                 shrink: 1.0,
             };
-            let setting = Cause::draw(&[*kind], 0, draw).setting;
+            let setting = Cause::draw(kind, draw).setting;
             assert!(sim::find(setting.spec.name).is_err(), "{}", setting.spec.name);
             setting.check(0).unwrap();
             assert_ne!(seen(vec![setting]), without);

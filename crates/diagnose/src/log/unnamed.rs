@@ -3,6 +3,7 @@
 use sim::Stage;
 
 use super::channels::{Channel, channels};
+use super::evidence::Evidence;
 use super::filter::MEASURED;
 use super::groups::unlisted_variants;
 use super::leads::{By, Lead, price};
@@ -18,6 +19,17 @@ use crate::Cause;
 pub(super) struct Unnamed {
     pub(super) cause: Cause,
     pub(super) refined: Option<Refined>,
+}
+
+impl Unnamed {
+    fn without_form(stage: Stage, acts_on: &str, depends_on: &str) -> Self {
+        let cause = Cause {
+            stage,
+            acts_on: acts_on.into(),
+            depends_on: depends_on.into(),
+        };
+        Self { cause, refined: None }
+    }
 }
 
 impl Search<'_> {
@@ -43,10 +55,7 @@ impl Search<'_> {
             self.unnamed = self.characterise(gain);
         }
         if self.unnamed.is_none() {
-            self.unnamed = rough(&self.channels, FAULTS * gain).filter(|_| !self.is_so_by_itself(heaviest));
-        }
-        if self.unnamed.is_none() {
-            self.unnamed = coloured(&self.channels, FAULTS * gain).filter(|_| !self.is_so_by_itself(colour));
+            self.unnamed = self.no_noise(FAULTS * gain);
         }
     }
 
@@ -71,18 +80,28 @@ impl Search<'_> {
         })
     }
 
-    /// Whether the filter finds about as much of `measure` in simulated logs of the best explanation: where rounding or large noise
-    /// takes the robot far from the pose about which it is linear.
-    fn is_so_by_itself(&self, measure: fn(&[Channel; MEASURED]) -> f64) -> bool {
+    /// What the innovations have that no noise of the best explanation gives, if it is worth more than `small` units of
+    /// log-likelihood. The filter finds some of it in simulated logs too, where rounding or large noise takes the robot far from the pose
+    /// about which it is linear.
+    fn no_noise(&self, small: f64) -> Option<Unnamed> {
         /// A multiple of the largest in simulated logs that is no chance.
         const TIMES: f64 = 1.5;
-        let Some(best) = self.found.first() else {
-            return false;
-        };
-        let simulated = repeats(&self.evidence, &best.settings, |repeated| {
-            Some(measure(&channels(&repeated.traces(&best.settings)?)))
+        type Measure = fn(&[Channel; MEASURED]) -> f64;
+        let found: [(Option<Unnamed>, Measure); 2] = [
+            (rough(&self.channels, small), heaviest),
+            (coloured(&self.channels, small), colour),
+        ];
+        if found.iter().all(|(unnamed, _)| unnamed.is_none()) {
+            return None;
+        }
+        let simulated = self.found.first().map_or(Vec::new(), |best| {
+            let of_log = |repeated: &Evidence<'_>| Some(channels(&repeated.traces(&best.settings)?));
+            repeats(&self.evidence, &best.settings, of_log)
         });
-        measure(&self.channels) < TIMES * simulated.into_iter().fold(0.0, f64::max)
+        found.into_iter().find_map(|(unnamed, measure)| {
+            let by_itself = simulated.iter().map(measure).fold(0.0, f64::max);
+            unnamed.filter(|_| measure(&self.channels) >= TIMES * by_itself)
+        })
     }
 }
 
@@ -100,28 +119,19 @@ fn colour(channels: &[Channel; MEASURED]) -> f64 {
 /// A mean that no explanation gives: innovations of a reading that are like their neighbours, which noise is not, and which are worth
 /// more than `small` units of log-likelihood. What acts on the robot's motion is seen by the camera most.
 fn coloured(channels: &[Channel; MEASURED], small: f64) -> Option<Unnamed> {
-    /// Log-likelihood that no fault of the filter gains: of 60 robots with effects of the list none has more than 8.
+    /// Log-likelihood that no fault of the filter gains: of 90 logged robots with effects of the list or none nothing has more than 8.
     const SURE: f64 = 50.0;
-    let most = colour(channels);
-    if most < SURE.max(small) {
+    if colour(channels) < SURE.max(small) {
         return None;
     }
     let (camera, readings) = channels.split_at(2);
     let gain = |channels: &[Channel]| channels.iter().map(Channel::gain_of_memory).sum::<f64>();
-    let is_of_readings = gain(readings) > gain(camera);
-    let (stage, acts_on) = if is_of_readings {
+    let (stage, acts_on) = if gain(readings) > gain(camera) {
         (Stage::Sense, "reading")
     } else {
         (Stage::Act, "wheel speed")
     };
-    Some(Unnamed {
-        cause: Cause {
-            stage,
-            acts_on: acts_on.into(),
-            depends_on: "place".into(),
-        },
-        refined: None,
-    })
+    Some(Unnamed::without_form(stage, acts_on, "place"))
 }
 
 /// Noise that no normal distribution has: innovations with heavy tails that are no edges of readings, and that are worth more than
@@ -144,14 +154,7 @@ fn rough(channels: &[Channel; MEASURED], small: f64) -> Option<Unnamed> {
         (false, 1 | 2) => (Stage::Sense, "reading"),
         _ => (Stage::Act, "wheel speed"),
     };
-    Some(Unnamed {
-        cause: Cause {
-            stage,
-            acts_on: acts_on.into(),
-            depends_on: "chance".into(),
-        },
-        refined: None,
-    })
+    Some(Unnamed::without_form(stage, acts_on, "chance"))
 }
 
 #[cfg(test)]
