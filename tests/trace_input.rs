@@ -101,6 +101,35 @@ fn a_log_with_gaps_is_traced() {
 }
 
 #[test]
+fn the_time_of_day_on_a_robots_clock_is_no_time_since_its_start() {
+    let (start, per_s) = (0.9, 2e-4);
+    let drifting = Setting {
+        spec: sim::find("reading-gain").unwrap(),
+        pattern: Pattern::ByTime {
+            start: vec![start],
+            per_s: vec![per_s],
+        },
+    };
+    let scratch = Scratch::new();
+    Robot::with(drifting).logged(&[5; 4]).record(&scratch, "set");
+    for run in ["a", "b", "c", "d"] {
+        rewrite(&scratch, &format!("set/run_{run}.csv"), |_, mut fields| {
+            let time_s: f64 = fields[0].parse().unwrap();
+            fields[0] = format!("{:.3}", 1.7e9 + time_s);
+            Some(fields)
+        });
+    }
+    let found = trace(&scratch, "braitenberg", "set", &[]);
+    says(&found, "explained", &["reading-gain"]);
+    assert_eq!(found["effects"][0]["by"], "time");
+    holds(&found["effects"][0], "gain", start, 1.0);
+    holds(&found["effects"][0], "gain_per_s", per_s, 0.0);
+    // Of a change in time, laps are compared that lie as far from the start.
+    let error = |key: &str| found["error"][key].as_f64().unwrap();
+    assert!(error("after") < error("before"), "{}", found["error"]);
+}
+
+#[test]
 fn a_run_whose_log_has_no_readings_has_the_mean_size_of_the_others() {
     const GAINS: [f64; 3] = [0.9, 1.05, 1.2];
     let by_run = Setting {

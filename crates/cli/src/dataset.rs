@@ -59,7 +59,7 @@ pub(crate) struct RunFile {
 /// A run, one row per control step: T rows in all.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct Rows {
-    /// T times, rising.
+    /// T times of whatever clock the file has, rising.
     pub(crate) t_s: Vec<f64>,
     /// T positions, x and y in m; `None` where the camera saw nothing.
     pub(crate) position_m: Vec<Option<[f64; 2]>>,
@@ -76,6 +76,14 @@ pub(crate) struct Log {
     pub(crate) left_m_s: Vec<f64>,
     /// T commands.
     pub(crate) right_m_s: Vec<f64>,
+}
+
+impl Rows {
+    /// T times since the run began, s.
+    pub(crate) fn since_start_s(&self) -> impl Iterator<Item = f64> {
+        let first = self.t_s.first().copied().unwrap_or_default();
+        self.t_s.iter().map(move |t_s| t_s - first)
+    }
 }
 
 impl DataSet {

@@ -28,8 +28,6 @@ pub(crate) struct SampledRun {
     pub(crate) wanted: usize,
     /// Whether the run ended because gate 0 was not crossed for too long.
     pub(crate) timed_out: bool,
-    /// Time of the run's first row, s.
-    pub(crate) began_s: f64,
     /// Sightings that are not used, in words.
     pub(crate) strays: Vec<String>,
 }
@@ -37,7 +35,7 @@ pub(crate) struct SampledRun {
 impl SampledRun {
     /// The laps to keep among all whole laps of a run, in order: the first is dropped, those that miss a gate are set
     /// aside, and of the others the first `wanted` kept.
-    pub(crate) fn new(set: &str, run: &str, whole: &[Lap], wanted: usize, began_s: f64) -> Self {
+    pub(crate) fn new(set: &str, run: &str, whole: &[Lap], wanted: usize) -> Self {
         let mut laps = Vec::with_capacity(wanted);
         let mut set_aside = Vec::new();
         for (number, lap) in whole.iter().enumerate().skip(1) {
@@ -56,7 +54,6 @@ impl SampledRun {
             set_aside,
             wanted,
             timed_out: false,
-            began_s,
             strays: Vec::new(),
         }
     }
@@ -65,15 +62,14 @@ impl SampledRun {
     pub(crate) fn start(&self) -> Start {
         let lap = &self.laps[0];
         // The dropped lap took about as long.
-        let until_lap_s = lap.start_s - self.began_s;
         let until_s = |gate: usize| lap.end_s - lap.times_s[gate] + lap.duration_s();
-        let off_s = |&gate: &usize| (until_s(gate) - until_lap_s).abs();
+        let off_s = |&gate: &usize| (until_s(gate) - lap.start_s).abs();
         // A run that starts on gate 0 may cross it at once or a lap later.
         let gate = (1..lap.times_s.len()).min_by(|a, b| off_s(a).total_cmp(&off_s(b)));
         let gate = gate.unwrap_or(0);
         Start {
             gate,
-            time_s: until_lap_s - until_s(gate),
+            time_s: lap.start_s - until_s(gate),
         }
     }
 
@@ -162,19 +158,18 @@ impl Measured {
         let lap = &self.runs[run].laps[lap];
         let rows = &self.set.runs[run].rows;
         let inside = |t: f64| t >= lap.start_s - 1e-9 && t <= lap.end_s + 1e-9;
-        rows.t_s
-            .iter()
+        rows.since_start_s()
             .zip(&rows.position_m)
-            .filter(|(t, _)| inside(**t))
+            .filter(|(t, _)| inside(*t))
             .filter_map(|(_, p)| *p)
             .collect()
     }
 }
 
-/// Times in s and positions in m where the robot was seen.
+/// Times since the run began in s and positions in m where the robot was seen.
 fn seen(run: &RunFile) -> impl Iterator<Item = (f64, Vec2)> {
-    let rows = run.rows.t_s.iter().zip(&run.rows.position_m);
-    rows.filter_map(|(&time_s, position)| position.map(|[x, y]| (time_s, Vec2::new(x, y))))
+    let rows = run.rows.since_start_s().zip(&run.rows.position_m);
+    rows.filter_map(|(time_s, position)| position.map(|[x, y]| (time_s, Vec2::new(x, y))))
 }
 
 fn sample(set: &DataSet, run: &RunFile, circuit: &Circuit, way: Way) -> Result<SampledRun> {
@@ -182,8 +177,7 @@ fn sample(set: &DataSet, run: &RunFile, circuit: &Circuit, way: Way) -> Result<S
     let whole: Vec<Lap> = seen(run)
         .filter_map(|(time_s, position)| tracker.push(time_s, position))
         .collect();
-    let began_s = run.rows.t_s.first().copied().unwrap_or_default();
-    let sampled = SampledRun::new(&set.name, &run.name, &whole, set.laps, began_s);
+    let sampled = SampledRun::new(&set.name, &run.name, &whole, set.laps);
     if sampled.laps.is_empty() {
         let path = run.path.display();
         if let Some((lap, gate)) = sampled.set_aside.first() {
@@ -211,7 +205,7 @@ pub(crate) fn simulated(name: &str, run: usize, drive: &Drive, wanted: usize) ->
         .chain(&drive.laps)
         .cloned()
         .collect();
-    let sampled = SampledRun::new(name, &crate::dataset::run_name(run), &whole, wanted, 0.0);
+    let sampled = SampledRun::new(name, &crate::dataset::run_name(run), &whole, wanted);
     SampledRun {
         timed_out: drive.timed_out,
         ..sampled
@@ -230,8 +224,8 @@ pub(crate) fn mean_and_deviation(values: &[f64]) -> (f64, f64) {
 mod tests {
     use super::*;
 
-    /// Laps of 50 s that pass 100 gates evenly, the first of them begun then.
-    fn run(first_s: f64, began_s: f64) -> SampledRun {
+    /// Laps of 50 s that pass 100 gates evenly, the first of them begun so long after the start.
+    fn run(first_s: f64) -> SampledRun {
         let lap = |k: usize| {
             let start_s = first_s + 50.0 * k as f64;
             Lap {
@@ -243,24 +237,24 @@ mod tests {
             }
         };
         let whole: Vec<Lap> = (0..4).map(lap).collect();
-        SampledRun::new("set", "a", &whole, 3, began_s)
+        SampledRun::new("set", "a", &whole, 3)
     }
 
     #[test]
     fn a_simulated_run_starts_where_the_measured_one_did() {
         // Gate 60 is 20 s before gate 0.
-        let start = run(23.0, 3.0).start();
+        let start = run(20.0).start();
         assert_eq!(start.gate, 60);
         assert!(start.time_s.abs() < 1e-9, "{start:?}");
         // Between gates: 0.1 s after gate 60.
-        let start = run(22.9, 3.0).start();
+        let start = run(19.9).start();
         assert_eq!(start.gate, 60);
         assert!((start.time_s + 0.1).abs() < 1e-9, "{start:?}");
     }
 
     #[test]
     fn a_run_that_had_driven_before_it_was_seen_has_a_clock_ahead() {
-        let start = run(123.0, 3.0).start();
+        let start = run(120.0).start();
         assert_eq!(start.gate, 1);
         assert!((start.time_s - 70.5).abs() < 1e-9, "{start:?}");
     }

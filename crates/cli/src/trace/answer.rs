@@ -28,8 +28,8 @@ fn log_rows(set: &DataSet) -> Option<Vec<Vec<LogRow>>> {
 
 fn rows_of(run: &RunFile) -> Option<Vec<LogRow>> {
     let log = run.rows.log.as_ref()?;
-    let row = |i: usize| LogRow {
-        time_s: run.rows.t_s[i],
+    let row = |(i, time_s): (usize, f64)| LogRow {
+        time_s,
         observed: run.rows.position_m[i].map(|[x, y]| Vec2::new(x, y)),
         readings: log.readings[i],
         command: WheelSpeeds {
@@ -37,7 +37,7 @@ fn rows_of(run: &RunFile) -> Option<Vec<LogRow>> {
             right_m_s: log.right_m_s[i],
         },
     };
-    Some((0..run.rows.t_s.len()).map(row).collect())
+    Some(run.rows.since_start_s().enumerate().map(row).collect())
 }
 
 /// The laps of a trace, and what simulates such.

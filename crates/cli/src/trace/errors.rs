@@ -12,14 +12,14 @@ use super::recording::{Recording, RunPlace};
 use crate::laps::SampledRun;
 use crate::setup::Setup;
 
-/// Runs behind every mean lap, each of at least 20 laps.
+/// Runs behind every mean lap, and laps of each; as many laps in all are driven in runs as long as the measured ones where what the
+/// robot does changes in the course of a run.
 const RUNS: u64 = 32;
+const LAPS: usize = 20;
 /// Runs that share a seed.
 const RUNS_PER_SEED: u64 = 4;
 /// Seeds of the laps that errors are measured with lie far from those of the fit.
 const SEED_OFFSET: u64 = 1 << 40;
-/// Laps behind every mean lap are at least so many a run.
-const LAPS: usize = 20;
 
 /// How far one recording's held-out runs are from the simulation.
 #[derive(Debug)]
@@ -45,10 +45,13 @@ pub(super) fn errors(
 ) -> Result<Vec<Errors>> {
     let mut all = Vec::new();
     for (place, recording) in recordings.iter().enumerate() {
-        let wanted = recording.shape().into_iter().fold(LAPS, usize::max);
+        if unseen.as_ref().is_some_and(|(at, _)| *at != place) {
+            continue;
+        }
+        let longest = recording.shape().into_iter().fold(1, usize::max);
         let laps_of = |effects: &[Setting], runs: Range<usize>| {
             let places = &recording.places(effects)[runs];
-            mean_laps(&recording.setup, effects, seed, wanted, places)
+            mean_laps(&recording.setup, effects, seed, longest, places)
         };
         let off_m = |laps: &MeanLaps, run: &SampledRun| laps.distance_m(&run.offsets_m());
         let all_runs = 0..recording.measured.runs.len();
@@ -60,7 +63,6 @@ pub(super) fn errors(
             laps_of(&settings, all_runs)?
         };
         let (held_out, before_m, after_m) = match &unseen {
-            Some((at, _)) if *at != place => continue,
             Some((_, runs)) => (
                 runs.clone(),
                 runs.iter().map(|run| off_m(&before, run)).collect(),
@@ -100,7 +102,7 @@ pub(super) fn errors(
     Ok(all)
 }
 
-/// The mean lap of a model with effects: of 32 runs of `laps` laps, which take the places of some measured runs in turn.
+/// The mean lap of a model with effects: of runs that take the places of some measured runs, of up to `longest` laps, in turn.
 ///
 /// # Errors
 /// A model that cannot drive, or hardly completes a lap.
@@ -108,9 +110,15 @@ fn mean_laps(
     setup: &Setup,
     effects: &[Setting],
     seed: u64,
-    laps: usize,
+    longest: usize,
     places: &[RunPlace],
 ) -> Result<MeanLaps> {
+    let changes = places.iter().any(|place| place.start.is_some());
+    let (laps, runs) = if changes {
+        (longest, RUNS.max(RUNS * LAPS as u64 / longest as u64))
+    } else {
+        (longest.max(LAPS), RUNS)
+    };
     let mut model = setup.model.clone();
     model.effects.extend_from_slice(effects);
     let drive = |i: u64| -> Result<Vec<Lap>> {
@@ -122,6 +130,6 @@ fn mean_laps(
         let world = setup.scene.world(&model, place.number)?;
         Ok(sim::drive_from(&world, streams, place.start, laps, |_| {})?.laps)
     };
-    let driven = (0..RUNS).into_par_iter().map(drive).collect::<Result<Vec<_>>>()?;
+    let driven = (0..runs).into_par_iter().map(drive).collect::<Result<Vec<_>>>()?;
     Ok(MeanLaps::new(&driven)?)
 }
