@@ -1,5 +1,6 @@
 //! What is tried: every effect of the registry that acts on the motion, the readings, the walls or the camera, with the
-//! places, sensors and sizes at which its column of derivatives is taken.
+//! places, sensors and sizes at which its column of derivatives is taken. Not here are effects on the controller, whose
+//! commands are recomputed, those on noise, which have no such column, and rounded readings, which show by themselves.
 
 use std::f64::consts::TAU;
 
@@ -126,7 +127,7 @@ pub(crate) fn slow_speeds(commands: impl Iterator<Item = WheelSpeeds>) -> Vec<f6
     sizes
 }
 
-/// The variants of one effect; none for the effects on the controller and on noise, which are judged otherwise.
+/// The variants of one effect; none of those that are judged otherwise.
 fn of(spec: &'static Spec, wall_lengths_m: [f64; 2], dead_bands_m_s: &[f64]) -> Vec<Variant> {
     let one = |neutral: f64, step: f64| vec![Variant::linear(spec, &[neutral], &[(0, step)])];
     let scan = |sizes: &[f64]| -> Vec<Variant> {
@@ -215,6 +216,24 @@ fn places(wall_lengths_m: [f64; 2], spacing_m: f64) -> impl Iterator<Item = (f64
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    const JUDGED_OTHERWISE: [&str; 7] = [
+        "controller-gain",
+        "controller-speed",
+        "reading-noise",
+        "reading-step",
+        "slip-level",
+        "slip-memory",
+        "camera-noise",
+    ];
+
+    #[test]
+    fn every_effect_is_tried_or_judged_otherwise() {
+        for spec in EFFECTS {
+            let is_tried = !of(spec, [3.0, 2.0], &[0.01]).is_empty();
+            assert_ne!(is_tried, JUDGED_OTHERWISE.contains(&spec.name), "{}", spec.name);
+        }
+    }
 
     #[test]
     fn dead_bands_lie_between_the_commands_that_are_given() {

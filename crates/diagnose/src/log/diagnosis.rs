@@ -110,6 +110,7 @@ pub fn diagnose_logs(
 impl Search<'_> {
     fn answer(self, decide: Decided, corners: Corners) -> LogDiagnosis {
         let certain = self.certain(&decide);
+        let is_certain = !certain.is_empty();
         let mut explanations: Vec<Explanation> = Vec::new();
         for refined in self.found.iter().take(12) {
             let explanation = self.explanation(refined, &certain);
@@ -167,11 +168,7 @@ impl Search<'_> {
         LogDiagnosis {
             answer,
             decide,
-            p: if self.rounding_counts.is_some() {
-                0.0
-            } else {
-                self.p
-            },
+            p: if is_certain { 0.0 } else { self.p },
             channels: self.channels,
             corners,
             steps: self.control_steps,
@@ -208,24 +205,21 @@ impl Search<'_> {
                 gain: refined.gain,
                 fitted: errors.iter().filter(|error| **error > 0.0).count(),
             });
-        let is_best = self
-            .found
-            .first()
-            .is_none_or(|best| best.settings == refined.settings);
+        let was_looked_at = self.remainder.beside == refined.settings;
         Explanation {
             effects: certain.iter().cloned().chain(own).collect(),
             gain: refined.gain,
             score: refined.score(),
             share: refined.gain / (refined.gain + self.left_beside(refined)).max(1e-9),
-            remainder_p: is_best.then_some(self.remainder.p),
+            remainder_p: was_looked_at.then_some(self.remainder.p),
             remainder: None,
         }
     }
 
-    /// Log-likelihood that further effects would gain beside the best explanation; other explanations lack what they gain
-    /// less than the best.
+    /// Log-likelihood that further effects would gain beside the best explanation of which that is known; other explanations lack
+    /// what they gain less than that.
     fn left_beside(&self, refined: &Refined) -> f64 {
-        let best = self.found.first().map_or(0.0, |best| best.gain);
+        let best = self.remainder.gain;
         let left = best * self.remainder.share / (1.0 - self.remainder.share).max(1e-9);
         left + (best - refined.gain).max(0.0)
     }

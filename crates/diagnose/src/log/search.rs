@@ -37,8 +37,12 @@ pub(super) const STEPS: usize = 8;
 const FIRST_STEPS: usize = 2;
 
 /// What further effects would gain beside an explanation.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub(super) struct Remainder {
+    /// The effects of that explanation.
+    pub(super) beside: Vec<Setting>,
+    /// Log-likelihood that they gain.
+    pub(super) gain: f64,
     /// Its share of what both gain together.
     pub(super) share: f64,
     /// Probability of as much by chance.
@@ -46,7 +50,12 @@ pub(super) struct Remainder {
 }
 
 impl Remainder {
-    const NONE: Self = Self { share: 0.0, p: 1.0 };
+    const NONE: Self = Self {
+        beside: Vec::new(),
+        gain: 0.0,
+        share: 0.0,
+        p: 1.0,
+    };
 
     pub(super) fn matters(&self) -> bool {
         self.p < SIGNIFICANT_P && self.share > MATTERS
@@ -63,11 +72,11 @@ pub(super) struct Search<'a> {
     pub(super) found: Vec<Refined>,
     /// Probability that as much is found in the logs of a robot that is as declared.
     pub(super) p: f64,
-    /// Beside the best candidate.
+    /// Beside the answer, or else beside the best candidate.
     pub(super) remainder: Remainder,
     /// A cause without a name, if that is the answer.
     pub(super) unnamed: Option<Unnamed>,
-    /// Under the best candidate.
+    /// Under the same.
     pub(super) channels: [Channel; MEASURED],
     /// Step that the readings were rounded to, counts, and what it gains in log-likelihood.
     pub(super) rounding_counts: Option<f64>,
@@ -284,6 +293,7 @@ impl<'a> Search<'a> {
         self.second(leads);
         self.sort();
         self.judge();
+        self.settle_beside_unnamed();
         if let (Some(best), None, None) = (self.found.first_mut(), self.rounding_counts, &self.unnamed) {
             *best = best.clone().with_honest_errors(&self.evidence, &self.variants);
         }
@@ -343,7 +353,7 @@ impl<'a> Search<'a> {
             return;
         };
         let (traces, leads) = &*screened;
-        self.settle(traces, leads, best.gain);
+        self.settle(&best, traces, leads);
         let noise = noises(&self.evidence, &best.settings, self.total() + best.gain);
         let left = noise.iter().map(|n| n.gain).fold(0.0, f64::max) / best.gain.max(1e-9);
         if self.remainder.p.min(by_chance(&noise)) >= SIGNIFICANT_P || self.remainder.share.max(left) < FAULTS
@@ -384,7 +394,7 @@ impl<'a> Search<'a> {
         self.sort();
         let best = self.found[0].clone();
         if let Some(screened) = self.screen(&best.settings) {
-            self.settle(&screened.0, &screened.1, best.gain);
+            self.settle(&best, &screened.0, &screened.1);
         }
     }
 
@@ -423,13 +433,27 @@ impl<'a> Search<'a> {
     }
 
     /// Notes what is left beside an explanation.
-    fn settle(&mut self, traces: &[(World<'a>, Trace)], leads: &[Lead], gain: f64) {
+    fn settle(&mut self, explanation: &Refined, traces: &[(World<'a>, Trace)], leads: &[Lead]) {
         self.channels = channels(traces);
-        let left = most(leads);
+        let (left, gain) = (most(leads), explanation.gain);
         self.remainder = Remainder {
+            beside: explanation.settings.clone(),
+            gain,
             share: left / (left + gain).max(1e-9),
             p: least_p(leads),
         };
+    }
+
+    /// Notes what is left beside a cause without a name. A wheel out of round has another angle in each run, and what the runs have in
+    /// common of it, its amplitude, leaves nothing to be looked at.
+    fn settle_beside_unnamed(&mut self) {
+        let unnamed = self.unnamed.as_ref().filter(|unnamed| !unnamed.is_a_wheel());
+        let Some(refined) = unnamed.and_then(|unnamed| unnamed.refined.clone()) else {
+            return;
+        };
+        if let Some(screened) = self.screen(&refined.settings) {
+            self.settle(&refined, &screened.0, &screened.1);
+        }
     }
 
     /// The best effect with each of the leads that are left beside it, where a refinement of the two begins.

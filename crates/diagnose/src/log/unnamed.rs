@@ -22,6 +22,11 @@ pub(super) struct Unnamed {
 }
 
 impl Unnamed {
+    /// Whether it is a wheel out of round.
+    pub(super) fn is_a_wheel(&self) -> bool {
+        self.cause.depends_on == "wheel angle"
+    }
+
     fn without_form(stage: Stage, acts_on: &str, depends_on: &str) -> Self {
         let cause = Cause {
             stage,
