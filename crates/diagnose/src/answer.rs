@@ -5,6 +5,7 @@ use std::ops::Range;
 use sim::{Pattern, Setting, Stage, UNLISTED};
 
 use crate::candidate::spread_over;
+use crate::laps::SIGNIFICANT_P;
 use crate::{Candidate, FourNumbers};
 
 /// How much of the residual is explained.
@@ -69,11 +70,21 @@ impl Explanation {
         self.effects.iter().any(|effect| *effect.setting.spec == UNLISTED)
     }
 
-    /// Share of what exceeds the declared model's expectation that it explains, in [0, 1]; `None` where that much of these
-    /// four numbers is often chance, of which nothing is a share.
-    pub fn explained(&self, of: &FourNumbers) -> Option<f64> {
-        let by_laps = self.remainder.is_some();
-        (!by_laps || !of.excess_is_chance()).then(|| self.share.clamp(0.0, 1.0))
+    /// Share of what exceeds the declared model's expectation that it explains, in [0, 1]; `None` where laps alone tell it and that
+    /// much of their four numbers is often chance, of which nothing is a share.
+    pub fn explained(&self, of_laps: Option<&FourNumbers>) -> Option<f64> {
+        let is_chance = of_laps.is_some_and(FourNumbers::excess_is_chance);
+        (!is_chance).then(|| self.share.clamp(0.0, 1.0))
+    }
+
+    /// Whether what remains is as likely as that by chance.
+    pub(crate) fn leaves_more_likely_than(&self, p: f64) -> bool {
+        self.remainder_p.is_some_and(|remainder_p| remainder_p >= p)
+    }
+
+    /// Whether nothing significant remains.
+    pub fn fits(&self) -> bool {
+        self.leaves_more_likely_than(SIGNIFICANT_P)
     }
 
     /// What the effects are, for a reader.
@@ -94,7 +105,7 @@ pub(crate) fn indistinguishable<'a>(
 ) -> usize {
     explanations.clone().next().map_or(0, |best| {
         let alike = |e: &&Explanation| {
-            e.score > best.score - behind
+            e.score >= best.score - behind
                 && e.effects.len() == best.effects.len()
                 && e.has_no_name() == best.has_no_name()
         };
@@ -327,14 +338,13 @@ mod tests {
                 noise,
             }
         };
-        let mut by_laps = answer(1.0, 1.0).explanations.remove(0);
-        by_laps.share = -1.25;
+        let mut found = answer(1.0, 1.0).explanations.remove(0);
+        found.share = -1.25;
         // From logs all that counts is the likelihood.
-        assert_eq!(by_laps.explained(&four(152.0)), Some(0.0));
-        by_laps.remainder = Some(four(120.0));
-        assert_eq!(by_laps.explained(&four(152.0)), None);
-        by_laps.share = 1.03;
-        assert_eq!(by_laps.explained(&four(1200.0)), Some(1.0));
+        assert_eq!(found.explained(None), Some(0.0));
+        assert_eq!(found.explained(Some(&four(152.0))), None);
+        found.share = 1.03;
+        assert_eq!(found.explained(Some(&four(1200.0))), Some(1.0));
     }
 
     /// The slip of standing still in one step of ten: mean 0.9, variance 0.09 + 0.9 * 0.01 / 3 of a slip of 0.1.

@@ -31,8 +31,8 @@ impl MeanLaps {
             completing,
             runs: runs_driven,
         })?;
-        let times_s = runs.iter().flatten().map(Lap::duration_s);
-        let times_s: Vec<f64> = times_s.filter(|time_s| time_s.is_finite()).collect();
+        let whole = runs.iter().flatten().filter(|lap| lap.missed.is_empty());
+        let times_s: Vec<f64> = whole.map(Lap::duration_s).collect();
         Ok(Self {
             mean_m,
             lap_s: times_s.iter().sum::<f64>() / times_s.len() as f64,

@@ -19,7 +19,7 @@ pub(crate) fn document(trace: &Trace) -> Value {
     let mut document = json!({
         "verdict": answer.verdict.name(),
         "residual": residual(trace),
-        "effects": claimed.map_or_else(Vec::new, |a| effects(a, rivals, &trace.residual)),
+        "effects": claimed.map_or_else(Vec::new, |a| effects(a, rivals, trace.laps_alone())),
         "alternative_sets": if sets.len() > 1 { sets } else { Vec::new() },
         "error": {
             "metric": "rms over the gates of the difference between the mean lateral position of simulated laps and of a held-out run, m",
@@ -27,7 +27,7 @@ pub(crate) fn document(trace: &Trace) -> Value {
             "floor": trace.mean_m(|e| &e.floor_m),
             "held_out": trace.held_out().map(|run| run.name.clone()).collect::<Vec<_>>(),
         },
-        "candidates": answer.explanations.iter().map(|e| candidate(e, &trace.residual)).collect::<Vec<_>>(),
+        "candidates": answer.explanations.iter().map(|e| candidate(e, trace.laps_alone())).collect::<Vec<_>>(),
         "separate_with": trace.experiments.iter().map(experiment).collect::<Vec<_>>(),
         "detectable": trace.detectable.iter().map(detectable).collect::<Vec<_>>(),
         "remarks": trace.remarks,
@@ -98,26 +98,14 @@ fn quadratic(q: &Quadratic) -> Value {
 }
 
 fn four(numbers: &FourNumbers) -> Value {
-    json!({
-        "mean": quadratic(&numbers.mean), "runs": quadratic(&numbers.runs),
-        "trend": quadratic(&numbers.trend), "noise": quadratic(&numbers.noise),
-    })
+    (numbers.named().into_iter())
+        .map(|(name, number)| (name.to_owned(), quadratic(number)))
+        .collect::<serde_json::Map<_, _>>()
+        .into()
 }
 
 fn residual(trace: &Trace) -> Value {
-    const SIGNIFICANT_P: f64 = 0.002;
     let numbers = &trace.residual;
-    let named = [
-        ("mean", numbers.mean),
-        ("runs", numbers.runs),
-        ("trend", numbers.trend),
-        ("noise", numbers.noise),
-    ];
-    let places: Vec<&str> = named
-        .iter()
-        .filter(|(_, q)| q.p < SIGNIFICANT_P)
-        .map(|(name, _)| *name)
-        .collect();
     let stage = match (&trace.answer.cause, trace.answer.claimed()) {
         (Some(cause), _) => Some(cause.stage),
         (None, Some(claimed)) => claimed.effects.first().map(Candidate::stage),
@@ -128,14 +116,14 @@ fn residual(trace: &Trace) -> Value {
         "stage": stage.map(sim::Stage::name),
         "significant": trace.answer.verdict != Verdict::Faithful,
         "p": numbers.omnibus_p().min(p),
-        "where": places,
+        "where": numbers.departing(),
         "acts_on": trace.answer.cause.as_ref().map(|cause| &cause.acts_on),
         "depends_on": trace.answer.cause.as_ref().map(|cause| &cause.depends_on),
         "numbers": four(numbers),
     })
 }
 
-fn effects(answer: &Explanation, rivals: &[Explanation], numbers: &FourNumbers) -> Vec<Value> {
+fn effects(answer: &Explanation, rivals: &[Explanation], laps: Option<&FourNumbers>) -> Vec<Value> {
     let count = answer.effects.len() as f64;
     let names = answer.names();
     let rivals: Vec<Vec<&str>> = rivals
@@ -149,7 +137,7 @@ fn effects(answer: &Explanation, rivals: &[Explanation], numbers: &FourNumbers) 
         alternatives.dedup();
         let mut entry = one_effect(effect);
         // Where no share of the excess can be stated, it is the share of what is explained.
-        entry["share"] = json!(answer.explained(numbers).unwrap_or(1.0) / count);
+        entry["share"] = json!(answer.explained(laps).unwrap_or(1.0) / count);
         entry["alternatives"] = json!(alternatives);
         entry
     };
@@ -231,10 +219,10 @@ pub(crate) fn parameters(effect: &Candidate) -> Vec<Value> {
     }
 }
 
-fn candidate(explanation: &Explanation, numbers: &FourNumbers) -> Value {
+fn candidate(explanation: &Explanation, laps: Option<&FourNumbers>) -> Value {
     json!({
         "names": explanation.names(), "label": explanation.label(),
-        "score": explanation.score, "gain": explanation.gain, "share": explanation.explained(numbers),
+        "score": explanation.score, "gain": explanation.gain, "share": explanation.explained(laps),
         "parameters": explanation.effects.iter().map(parameters).collect::<Vec<_>>(),
         "remainder": explanation.remainder.as_ref().map(four), "remainder_p": explanation.remainder_p,
     })

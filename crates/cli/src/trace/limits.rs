@@ -6,7 +6,7 @@ use diagnose::{Decided, Detectable};
 use sim::Param;
 
 use super::Trace;
-use super::next::Experiment;
+use super::next::{Experiment, MOST_LAPS};
 use crate::experiments::Block;
 use crate::table::{Table, far_from, probability};
 
@@ -34,7 +34,7 @@ pub(crate) fn next_in_words(trace: &Trace) -> Option<String> {
     let best = trace.experiments.first()?;
     let laps = match best.laps_needed() {
         Some(laps) => format!("about {laps} laps would do for 5 standard deviations"),
-        None => "more than ten such sets would be needed for 5 standard deviations".to_owned(),
+        None => format!("more than {MOST_LAPS} laps would be needed for 5 standard deviations"),
     };
     Some(format!(
         "To tell them apart: {} ({}; {laps}); add them as a second --measured.",
@@ -75,29 +75,30 @@ pub(super) fn next_experiment(trace: &Trace) -> Vec<Block> {
 /// The smallest effects that would have been seen.
 pub(super) fn limits(trace: &Trace) -> Vec<Block> {
     let mut blocks: Vec<Block> = trace.remarks.iter().cloned().map(Block::Text).collect();
-    let mut names: BTreeMap<&str, Vec<&Detectable>> = BTreeMap::new();
+    let mut sizes: BTreeMap<(&str, &str), Vec<&Detectable>> = BTreeMap::new();
     for detectable in &trace.detectable {
-        names.entry(detectable.spec.name).or_default().push(detectable);
+        let size = (detectable.spec.name, detectable.parameter);
+        sizes.entry(size).or_default().push(detectable);
     }
     let mut table = Table::new(
         format!(
             "Sizes from which a single effect shows in these {} in 95 of 100 cases (over its sensors, places and directions: the \
              easiest to the hardest)",
-            if trace.from_logs.is_some() { "logs" } else { "laps" }
+            trace.source()
         ),
         &["effect", "parameter", "below", "above"],
     );
     let mut unseen = vec!["marker-offset (angle_rad)".to_owned()];
-    for (name, all) in names {
+    for ((name, parameter), all) in sizes {
         let side = |of: &dyn Fn(&Detectable) -> Option<f64>, reversed: bool| range(&all, of, reversed);
         let (below, above) = (side(&|d| d.below, true), side(&|d| d.above, false));
         if below.is_none() && above.is_none() {
-            unseen.push(name.to_owned());
+            unseen.push(format!("{name} ({parameter})"));
             continue;
         }
         let parameter = match all[0].unit {
-            "" => all[0].parameter.to_owned(),
-            unit => format!("{}, {unit}", all[0].parameter),
+            "" => parameter.to_owned(),
+            unit => format!("{parameter}, {unit}"),
         };
         let shown = |side: Option<String>| side.unwrap_or_else(|| "-".to_owned());
         table.push([name.to_owned(), parameter, shown(below), shown(above)]);

@@ -63,6 +63,16 @@ pub(crate) struct Trace {
 }
 
 impl Trace {
+    /// How the laps depart from the declared model, where they are all that was judged.
+    pub(crate) fn laps_alone(&self) -> Option<&FourNumbers> {
+        self.from_logs.is_none().then_some(&self.residual)
+    }
+
+    /// What was judged, in a word.
+    fn source(&self) -> &'static str {
+        self.from_logs.as_ref().map_or("laps", |_| "logs")
+    }
+
     /// Traces what a model lacks in measured data sets.
     ///
     /// # Errors

@@ -20,6 +20,8 @@ const LOGGED_LAPS: usize = 3;
 const ENOUGH: f64 = 5.0;
 /// Standard deviations that stand for certainty.
 const CERTAIN: f64 = 1e3;
+/// Laps that are more than anyone records.
+pub(super) const MOST_LAPS: usize = 1000;
 /// Rivals that are looked at.
 const RIVALS: usize = 3;
 
@@ -60,10 +62,8 @@ impl Experiment {
 
     /// Laps that tell the answer from every rival; `None` if that would take too many.
     pub(crate) fn laps_needed(&self) -> Option<usize> {
-        /// More than anyone records.
-        const MOST: f64 = 1000.0;
         let needed = (self.laps as f64 * (ENOUGH / self.least()).powi(2)).ceil();
-        (needed <= MOST).then_some((needed as usize).max(RUNS))
+        (needed <= MOST_LAPS as f64).then_some((needed as usize).max(RUNS))
     }
 }
 
@@ -144,6 +144,8 @@ pub(crate) fn experiments(trace: &Trace, seed: u64) -> Result<Vec<Experiment>> {
             }));
         }
     }
+    // Interrupted, the last one came to nothing.
+    interrupt::check()?;
     found.retain(|experiment| experiment.least() > 0.3);
     found.sort_by(|a, b| {
         (b.least() / (b.laps as f64).sqrt()).total_cmp(&(a.least() / (a.laps as f64).sqrt()))

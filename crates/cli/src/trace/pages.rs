@@ -62,12 +62,15 @@ pub(crate) fn summary(trace: &Trace) -> String {
     let answer = diagnosis.explanations.first();
     let said = match (diagnosis.verdict, answer) {
         (Verdict::Faithful, _) => {
-            "Faithful: the laps do not depart from the declared model by more than chance allows.".to_owned()
+            format!(
+                "Faithful: the {} do not depart from the declared model by more than chance allows.",
+                trace.source()
+            )
         }
         (Verdict::Unexplained, _) | (_, None) => unexplained(trace),
         (v, Some(answer)) => {
             let what: Vec<String> = answer.effects.iter().map(describe).collect();
-            let rest = if v == Verdict::Explained && answer.remainder_p.is_some_and(|p| p < 0.001) {
+            let rest = if v == Verdict::Explained && answer.remainder_p.is_some() && !answer.fits() {
                 " What remains is significant but small."
             } else if v == Verdict::PartlyExplained {
                 " What remains is significant and matters."
@@ -76,7 +79,7 @@ pub(crate) fn summary(trace: &Trace) -> String {
             };
             let mut word = v.name().to_owned();
             word[..1].make_ascii_uppercase();
-            let explains = match answer.explained(&trace.residual) {
+            let explains = match answer.explained(trace.laps_alone()) {
                 Some(share) => format!("this explains {:.1} % of the excess", 100.0 * share),
                 None => format!(
                     "this gains {:.1} units of log-likelihood, of an excess that as a whole chance often makes",
@@ -92,7 +95,11 @@ pub(crate) fn summary(trace: &Trace) -> String {
     let alternatives = if others.is_empty() {
         String::new()
     } else {
-        format!(" These laps do not tell it apart from: {}.", others.join("; "))
+        format!(
+            " These {} do not tell it apart from: {}.",
+            trace.source(),
+            others.join("; ")
+        )
     };
     let next = next_in_words(trace).map_or(String::new(), |next| format!("\n{next}"));
     format!(
@@ -303,8 +310,12 @@ fn candidates(trace: &Trace) -> Vec<Block> {
     if trace.answer.explanations.is_empty() {
         return vec![Block::Text("Nothing had to be tried.".into())];
     }
+    let source = trace.source();
     let mut table = Table::new(
-        "Explanations fitted to the laps, best first by what they gain less the price of their numbers; those marked * cannot be told apart by these laps",
+        format!(
+            "Explanations fitted to the {source}, best first by what they gain less the price of their numbers; those marked * cannot be \
+             told apart by these {source}"
+        ),
         &[
             "effect",
             "log-likelihood gained",
@@ -322,9 +333,9 @@ fn candidates(trace: &Trace) -> Vec<Block> {
         };
         table.push([
             format!("{}{star}", e.label()),
-            format!("{:.1}", e.gain),
-            format!("{:.1}", e.score),
-            e.explained(&trace.residual)
+            units(e.gain),
+            units(e.score),
+            e.explained(trace.laps_alone())
                 .map_or("-".into(), |share| format!("{:.1} %", 100.0 * share)),
             e.remainder_p.map_or("-".into(), probability),
             sizes(e),
@@ -333,6 +344,15 @@ fn candidates(trace: &Trace) -> Vec<Block> {
     let mut blocks = vec![Block::Table(table)];
     blocks.extend(unnamed(trace));
     blocks
+}
+
+/// Log-likelihood; what a log shows exactly is no matter of likelihood.
+fn units(gain: f64) -> String {
+    if gain.is_finite() {
+        format!("{gain:.1}")
+    } else {
+        "certain".into()
+    }
 }
 
 fn sizes(explanation: &Explanation) -> String {

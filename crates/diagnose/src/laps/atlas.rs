@@ -56,8 +56,8 @@ pub struct Atlas {
 pub(super) struct Spent(AtomicU64);
 
 impl Spent {
-    pub(super) fn add_one(&self) {
-        self.0.fetch_add(1, Ordering::Relaxed);
+    pub(super) fn add(&self, sets: u64) {
+        self.0.fetch_add(sets, Ordering::Relaxed);
     }
 
     pub(super) fn count(&self) -> u64 {
@@ -118,6 +118,8 @@ impl Atlas {
                 let runs = simulate(&[], set).ok_or(Error::DeclaredModelStops)?;
                 Summary::new(&runs, &[runs.len()]).ok_or(Error::TooFewLaps)
             })
+            .collect::<Vec<_>>()
+            .into_iter()
             .collect::<Result<_, _>>()?;
         let laps: Vec<usize> = simulate(&[], 0)
             .ok_or(Error::DeclaredModelStops)?
@@ -145,6 +147,7 @@ impl Atlas {
         };
         drop(null);
         atlas.paths = atlas.simulate_paths(simulate, tick);
+        atlas.spent = Spent::default();
         Ok(atlas)
     }
 
@@ -267,9 +270,9 @@ impl Atlas {
         lap.rows(lap.len() - BLOCKS, BLOCKS).sum() / 100.0
     }
 
-    /// Laps of a run: those of the first.
-    pub(super) fn run_laps(&self) -> usize {
-        self.layout.laps[0][0]
+    /// Laps of a run, on average.
+    pub(super) fn run_laps(&self) -> f64 {
+        self.layout.total_laps() as f64 / self.layout.runs() as f64
     }
 
     /// What data say, if they have the shape that the atlas was made for, run by run.

@@ -6,16 +6,17 @@ use super::screen::price;
 use crate::detectable::{Detectable, QUANTILE_95};
 
 impl Atlas {
-    /// The smallest sizes of all effects that these data show, probe by probe.
+    /// The smallest sizes of all effects that these data show, probe by probe; vectors along their axes.
     pub fn detectable(&self) -> Vec<Detectable> {
         (0..self.probes.len())
             .filter(|&probe| !self.probes[probe].sizes.is_empty())
-            .map(|probe| self.detectable_of(probe))
+            .filter_map(|probe| self.detectable_of(probe))
             .collect()
     }
 
-    fn detectable_of(&self, probe: usize) -> Detectable {
+    fn detectable_of(&self, probe: usize) -> Option<Detectable> {
         let p = &self.probes[probe];
+        let param = &p.spec.params[p.only_moving()?];
         let nodes = self.nodes(probe);
         let needed = self.needed(p.free.len());
         let side = |sign: f64| {
@@ -25,15 +26,14 @@ impl Atlas {
             own.sort_by(|a, b| a.0.total_cmp(&b.0));
             smallest(&own, needed).map(|size| p.neutral + sign * size)
         };
-        let param = &p.spec.params[p.size_index()];
-        Detectable {
+        Some(Detectable {
             spec: p.spec,
             label: p.label(),
             parameter: param.name,
             unit: param.unit,
             below: side(-1.0),
             above: side(1.0),
-        }
+        })
     }
 
     /// Standard deviations of a signal that raises the alarm in 95 of 100 cases.

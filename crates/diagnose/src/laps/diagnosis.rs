@@ -11,15 +11,13 @@ use super::observed::ObservedLap;
 use super::ripple::Ripple;
 use super::screen::Screened;
 use super::search::{Found, STRONG, Search, candidates, of_other_effects, sort};
-use super::tests_of_fit::{FourNumbers, SIGNIFICANT_P};
+use super::tests_of_fit::{ALARM_P, FourNumbers};
 use super::trial::Trial;
 use crate::answer::{ALTERNATIVE, indistinguishable};
 use crate::{Answer, Cause, Error, Explanation, Verdict, Watch};
 
 /// Score of the best probe from which a data set counts as departing from the declared model, whatever the omnibus says.
 pub(super) const ALARM_SCORE: f64 = 7.0;
-/// Omnibus probability below which it does.
-const ALARM_P: f64 = 0.002;
 /// Probability of what is left below which something is left that is worth a search, however small a share it is.
 const SURELY_P: f64 = 1e-6;
 /// Probability of what is left from which on it may still be chance.
@@ -57,18 +55,6 @@ const ALL_BUT_FAULTS: f64 = 0.999;
 const PATTERNS_OF: usize = 3;
 const PATTERNS_OF_SEVERAL: usize = 2;
 
-/// Whether what an explanation leaves is as likely as that by chance.
-fn leaves_more_likely_than(explanation: &Explanation, p: f64) -> bool {
-    explanation
-        .remainder_p
-        .is_some_and(|remainder_p| remainder_p >= p)
-}
-
-/// Whether an explanation leaves nothing significant.
-fn fits(explanation: &Explanation) -> bool {
-    leaves_more_likely_than(explanation, SIGNIFICANT_P)
-}
-
 /// Whether an explanation leaves nothing significant, or next to nothing.
 fn suffices(explanation: &Explanation) -> bool {
     let enough = if explanation.effects.len() > 1 {
@@ -76,12 +62,12 @@ fn suffices(explanation: &Explanation) -> bool {
     } else {
         ENOUGH
     };
-    fits(explanation) || explanation.share >= enough && leaves_more_likely_than(explanation, SURELY_P)
+    explanation.fits() || explanation.share >= enough && explanation.leaves_more_likely_than(SURELY_P)
 }
 
 /// Whether an explanation needs no further effect.
 fn stands_alone(explanation: &Explanation) -> bool {
-    (fits(explanation) || suffices(explanation) && explanation.share >= ALL_BUT)
+    (explanation.fits() || suffices(explanation) && explanation.share >= ALL_BUT)
         && !is_doubtful(explanation, TOO_LITTLE)
 }
 
@@ -93,7 +79,7 @@ fn leaves_nothing_to_ask(explanation: &Explanation) -> bool {
 /// Whether an explanation with a share below this leaves what is not likely either.
 fn is_doubtful(explanation: &Explanation, share: f64) -> bool {
     const DOUBTFUL_P: f64 = 0.1;
-    explanation.share <= share && !leaves_more_likely_than(explanation, DOUBTFUL_P)
+    explanation.share <= share && !explanation.leaves_more_likely_than(DOUBTFUL_P)
 }
 
 /// What laps tell about a model.
@@ -116,7 +102,7 @@ impl Atlas {
         runs: &[Vec<ObservedLap>],
         watch: &Watch<'_>,
     ) -> Result<LapDiagnosis, Error> {
-        let memo = Memo::new(simulate, &self.spent);
+        let memo = Memo::new(simulate);
         let simulate: &Simulate<'_> = &|effects, set| memo.simulate(effects, set);
         let data = self.observed(runs)?;
         let residual = self.white(&data, &self.null);
@@ -230,7 +216,7 @@ fn explain(search: &Search<'_>, mut found: Vec<Found>) -> Vec<Found> {
     let needs_no_scan = |best: &Explanation| {
         // What explains most and leaves something lacks a second effect rather than another name.
         let lacks_another = best.share > MOST && !jumps && !goes_over_runs_or_time(best);
-        suffices(best) && !is_doubtful(best, ENOUGH) || lacks_another && !fits(best)
+        suffices(best) && !is_doubtful(best, ENOUGH) || lacks_another && !best.fits()
     };
     if !first_is(&found, needs_no_scan) {
         let clear = search.clear_pairs();
@@ -358,7 +344,7 @@ fn verdict_of(best: &Explanation) -> Verdict {
         return Verdict::Unexplained;
     }
     if suffices(best) {
-        let clear = best.score >= CLEAR && leaves_more_likely_than(best, CLEAR_P);
+        let clear = best.score >= CLEAR && best.leaves_more_likely_than(CLEAR_P);
         return if is_doubtful(best, TOO_LITTLE) && !clear {
             Verdict::Unexplained
         } else {
@@ -366,7 +352,7 @@ fn verdict_of(best: &Explanation) -> Verdict {
         };
     }
     // Laps have heavier tails than their covariance says.
-    let may_be_chance = leaves_more_likely_than(best, HARDLY_P);
+    let may_be_chance = best.leaves_more_likely_than(HARDLY_P);
     let enough = match best.effects.len() {
         _ if best.has_no_name() => MOST,
         _ if best.score <= STRONG && !may_be_chance => return Verdict::Unexplained,
@@ -419,9 +405,9 @@ fn preferred(fewer: Vec<Found>, more: Vec<Found>) -> Vec<Found> {
     };
     // Noise that is too large covers what it does not explain.
     let covered = if noises(a) > 0 { AS_GOOD } else { 0.0 };
-    let better = fits(b) || b.share >= ALL_BUT || !suffices(a) && b.share > a.share - covered;
+    let better = b.fits() || b.share >= ALL_BUT || !suffices(a) && b.share > a.share - covered;
     let worth = if suffices(a) { WORTH_BESIDE } else { WORTH };
-    let faults = if fits(b) {
+    let faults = if b.fits() {
         faults_beside(a)
     } else {
         FAULTS * a.gain
@@ -484,7 +470,7 @@ impl Atlas {
         runs: &[Vec<ObservedLap>],
         effects: &[Setting],
     ) -> Result<(FourNumbers, Option<FourNumbers>), Error> {
-        let memo = Memo::new(simulate, &self.spent);
+        let memo = Memo::new(simulate);
         let simulate: &Simulate<'_> = &|effects, set| memo.simulate(effects, set);
         let data = self.observed(runs)?;
         let before = FourNumbers::new(&self.white(&data, &self.null), &self.layout);

@@ -234,14 +234,20 @@ impl Part {
 
     /// Its size, the mean over the runs.
     pub(super) fn mean_size(&self, atlas: &Atlas) -> f64 {
-        let size = atlas.probes[self.probe].size_index();
-        self.values.iter().map(|values| values[size]).sum::<f64>() / self.values.len() as f64
+        let size_of = |values: &Vec<f64>| atlas.probes[self.probe].size_of(values);
+        self.values.iter().map(size_of).sum::<f64>() / self.values.len() as f64
     }
 
     /// The same at its mean size.
     fn plain(&self, atlas: &Atlas) -> Self {
+        let probe = &atlas.probes[self.probe];
         let mut values = self.values[0].clone();
-        values[atlas.probes[self.probe].size_index()] = self.mean_size(atlas) + self.per_s * middle_s(atlas);
+        for (i, change) in probe.along(self.per_s * middle_s(atlas)).into_iter().enumerate() {
+            if probe.moves(i) {
+                let all = self.values.iter().map(|values| values[i]);
+                values[i] = all.sum::<f64>() / self.values.len() as f64 + change;
+            }
+        }
         Self {
             shape: Shape::Constant,
             values: vec![values],
@@ -278,14 +284,10 @@ impl Part {
         let pattern = match self.shape {
             Shape::Constant => Pattern::Constant(self.values[0].clone()),
             Shape::ByRun => Pattern::ByRun(self.values.clone()),
-            Shape::ByTime => {
-                let mut per_s = vec![0.0; self.values[0].len()];
-                per_s[probe.free[0].0] = self.per_s;
-                Pattern::ByTime {
-                    start: self.values[0].clone(),
-                    per_s,
-                }
-            }
+            Shape::ByTime => Pattern::ByTime {
+                start: self.values[0].clone(),
+                per_s: probe.along(self.per_s),
+            },
         };
         Setting {
             spec: probe.spec,
@@ -309,7 +311,10 @@ impl Part {
         }
         for (freedom, error) in errors.iter().filter(|(f, _)| f.part == part) {
             match freedom.parameter {
-                None => all[count + atlas.probes[self.probe].free[0].0] = *error,
+                None => {
+                    let along = atlas.probes[self.probe].along(*error);
+                    (all[count..].iter_mut().zip(along)).for_each(|(all, along)| *all = along.abs());
+                }
                 Some(i) => {
                     let runs = freedom.run.map_or(0..self.values.len(), |run| run..run + 1);
                     runs.for_each(|run| all[run * count + i] = *error);
@@ -321,8 +326,15 @@ impl Part {
 
     /// Intervals of its values that were found, by their place among the pattern's values.
     pub(super) fn intervals(&self, part: usize, intervals: &[Interval]) -> BTreeMap<usize, [f64; 2]> {
-        let own = intervals.iter().filter(|(freedom, _)| freedom.part == part);
-        own.filter_map(|(freedom, ends)| Some((freedom.parameter?, *ends)))
+        let count = self.values[0].len();
+        // What all runs share stands beside each run's own.
+        let in_every_run = |i: usize, ends: [f64; 2]| {
+            let runs = 0..self.values.len();
+            runs.map(move |run| (run * count + i, ends))
+        };
+        (intervals.iter().filter(|(freedom, _)| freedom.part == part))
+            .filter_map(|(freedom, ends)| Some(in_every_run(freedom.parameter?, *ends)))
+            .flatten()
             .collect()
     }
 
@@ -337,8 +349,8 @@ impl Part {
         for (i, &(parameter, _)) in probe.free.iter().enumerate() {
             let quantum = probe.quantum.filter(|_| i == 0);
             let step = quantum.unwrap_or(probe.step_at(i, size) * self.stride);
-            let parameter = Some(parameter);
-            if i == 0 && self.shape == Shape::ByRun {
+            if probe.moves(parameter) && self.shape == Shape::ByRun {
+                let parameter = Some(parameter);
                 freedoms.extend((0..runs).map(|run| Freedom {
                     part,
                     run: Some(run),
@@ -350,14 +362,14 @@ impl Part {
                 freedoms.push(Freedom {
                     part,
                     run: None,
-                    parameter,
+                    parameter: Some(parameter),
                     step,
                     quantum,
                 });
             }
         }
         if self.shape == Shape::ByTime {
-            let run_s = atlas.run_laps() as f64 * atlas.lap_s();
+            let run_s = atlas.run_laps() * atlas.lap_s();
             freedoms.push(Freedom {
                 part,
                 run: None,
@@ -372,7 +384,7 @@ impl Part {
 
 /// Time at which a run's laps are half done: the kept ones begin one and a half laps after the run, on average.
 fn middle_s(atlas: &Atlas) -> f64 {
-    (1.5 + atlas.run_laps() as f64 / 2.0) * atlas.lap_s()
+    (1.5 + atlas.run_laps() / 2.0) * atlas.lap_s()
 }
 
 impl Hypothesis {
@@ -460,15 +472,21 @@ impl Hypothesis {
 
     fn pattern_shows(&self, part: usize, errors: &[(Freedom, f64)]) -> bool {
         const CHANCE: f64 = 0.01;
-        let numbers = |are: fn(&Freedom) -> bool| -> Vec<(f64, f64)> {
+        let numbers = |are: &dyn Fn(&Freedom) -> bool| -> Vec<(f64, f64)> {
             let own = errors.iter().filter(|(f, _)| f.part == part && are(f));
             own.map(|(f, error)| (self.get(f), *error)).collect()
         };
         let p = match self.parts[part].shape {
             Shape::Constant => 0.0,
-            Shape::ByRun => differ(&numbers(|f| f.run.is_some())).p,
+            Shape::ByRun => {
+                let count = self.parts[part].values[0].len();
+                let of = |i: usize| differ(&numbers(&|f| f.run.is_some() && f.parameter == Some(i)));
+                let all: Vec<Quadratic> = (0..count).map(of).collect();
+                let freedom = all.iter().map(|differ| differ.freedom).sum();
+                Quadratic::new(all.iter().map(|differ| differ.q).sum(), freedom).p
+            }
             Shape::ByTime => {
-                let changes = numbers(|f| f.parameter.is_none());
+                let changes = numbers(&|f| f.parameter.is_none());
                 let squares = changes.iter().map(|(change, error)| (change / error).powi(2));
                 Quadratic::new(squares.sum(), 1).p
             }
@@ -509,12 +527,17 @@ impl Hypothesis {
         let is_idle = |&number: &usize| {
             let part = &self.parts[number];
             let probe = &atlas.probes[part.probe];
-            let size = probe.size_index();
-            let is_size = |f: &Freedom| f.part == number && f.parameter == Some(size);
-            let fitted = errors.iter().find(|(freedom, _)| is_size(freedom));
-            let error = part.held.or(fitted.map(|(_, error)| *error));
+            let is_near_nothing =
+                |i: usize, error: f64| (part.values[0][i] - probe.origin()[i]).abs() < ERRORS * error;
+            let mut fitted = (errors.iter().filter(|(freedom, _)| freedom.part == number))
+                .filter_map(|(freedom, error)| Some((freedom.parameter?, *error)))
+                .filter(|(i, _)| probe.is_size(*i))
+                .peekable();
             part.shape == Shape::Constant
-                && error.is_some_and(|error| (part.values[0][size] - probe.neutral).abs() < ERRORS * error)
+                && match part.held {
+                    Some(error) => is_near_nothing(probe.size_index(), error),
+                    None => fitted.peek().is_some() && fitted.all(|(i, error)| is_near_nothing(i, error)),
+                }
         };
         (0..self.parts.len()).filter(is_idle).collect()
     }

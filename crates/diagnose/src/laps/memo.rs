@@ -5,7 +5,7 @@ use std::sync::Mutex;
 
 use sim::Setting;
 
-use super::atlas::{Simulate, Spent};
+use super::atlas::Simulate;
 use super::observed::ObservedLap;
 
 /// Data sets that are kept: a search goes on from where it was a moment ago. Of 80 laps and 100 gates they take 64 MB.
@@ -19,27 +19,23 @@ struct Known {
     runs: Option<Vec<Vec<ObservedLap>>>,
 }
 
-/// A simulation that remembers its latest data sets. It counts all that are asked for: which of them are still known depends on
-/// how threads take turns.
+/// A simulation that remembers its latest data sets.
 pub(super) struct Memo<'a> {
     simulate: &'a Simulate<'a>,
-    spent: &'a Spent,
     /// Oldest first.
     known: Mutex<VecDeque<Known>>,
 }
 
 impl<'a> Memo<'a> {
-    pub(super) fn new(simulate: &'a Simulate<'a>, spent: &'a Spent) -> Self {
+    pub(super) fn new(simulate: &'a Simulate<'a>) -> Self {
         Self {
             simulate,
-            spent,
             known: Mutex::default(),
         }
     }
 
     /// One data set; see [`Simulate`].
     pub(super) fn simulate(&self, effects: &[Setting], set: u64) -> Option<Vec<Vec<ObservedLap>>> {
-        self.spent.add_one();
         let is_it = |known: &&Known| known.set == set && known.effects == effects;
         if let Some(known) = self.known().iter().find(is_it) {
             return known.runs.clone();
@@ -79,14 +75,13 @@ mod tests {
             count.fetch_add(1, Ordering::Relaxed);
             (set != 3).then(Vec::new)
         };
-        let spent = Spent::default();
-        let memo = Memo::new(&simulate, &spent);
+        let memo = Memo::new(&simulate);
         let scale = |factor: f64| [Setting::constant(find("wheel-scale").unwrap(), [factor])];
         for _ in 0..2 {
             assert!(memo.simulate(&scale(1.1), 1).is_some() && memo.simulate(&scale(1.1), 3).is_none());
             assert!(memo.simulate(&scale(1.2), 1).is_some() && memo.simulate(&[], 1).is_some());
         }
-        assert_eq!((count.load(Ordering::Relaxed), spent.count()), (4, 8));
+        assert_eq!(count.load(Ordering::Relaxed), 4);
         (10..10 + KEPT as u64).for_each(|set| drop(memo.simulate(&[], set)));
         memo.simulate(&scale(1.1), 1);
         assert_eq!(count.load(Ordering::Relaxed), 4 + KEPT as u64 + 1);

@@ -48,4 +48,5 @@ pub use baseline::Baselines;
 pub use diagnosis::LapDiagnosis;
 pub use observed::ObservedLap;
 pub use separation::{Rival, separations};
+pub(crate) use tests_of_fit::SIGNIFICANT_P;
 pub use tests_of_fit::{FourNumbers, Quadratic};

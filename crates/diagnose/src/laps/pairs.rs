@@ -266,7 +266,7 @@ impl Search<'_> {
         if !tried.fits() && !jumps_first && !self.explains_most(&tried) {
             if !self.was_scanned() {
                 self.scan(singles);
-                if singles.first().is_some_and(Found::fits) {
+                if singles.first().is_some_and(|best| best.explanation.fits()) {
                     return self.settle(tried.descents);
                 }
             }
@@ -323,7 +323,7 @@ impl Search<'_> {
         const PROMISING_BESIDE: f64 = 10.0;
         let least = FAIR_SHARE * faults;
         let mut tried = Tried::new(&ROUNDS_BESIDE, single.explanation.score);
-        if !stands && !single.fits() {
+        if !stands && !single.explanation.fits() {
             self.descend_on(&mut tried, self.pairs_about(single));
         }
         if tried.fits() {

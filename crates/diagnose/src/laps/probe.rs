@@ -67,9 +67,48 @@ impl Probe {
         self.scanned > 0
     }
 
-    /// Which parameter sizes it.
+    /// Which parameter sizes it; of a vector, the first that does.
     pub(super) fn size_index(&self) -> usize {
         self.free[0].0
+    }
+
+    /// Whether a parameter sizes it: one does, and of a vector both.
+    pub(super) fn is_size(&self, parameter: usize) -> bool {
+        let param = self.spec.params.get(parameter);
+        parameter == self.size_index() || self.fits_direction() && param.is_some_and(|p| p.neutral.is_some())
+    }
+
+    /// The size of such values, of a vector that along its direction.
+    pub(super) fn size_of(&self, values: &[f64]) -> f64 {
+        let size = self.size_index();
+        if self.direction[size] == 1.0 {
+            return values[size];
+        }
+        let off = values
+            .iter()
+            .zip(&self.origin)
+            .map(|(value, origin)| value - origin);
+        self.neutral + off.zip(&self.direction).map(|(off, d)| off * d).sum::<f64>()
+    }
+
+    /// How all parameters change where the size changes by so much; of a group of basis functions the first number does.
+    pub(super) fn along(&self, change: f64) -> Vec<f64> {
+        let mut along: Vec<f64> = self.direction.iter().map(|d| d * change).collect();
+        if self.sizes.is_empty() {
+            along[self.size_index()] = change;
+        }
+        along
+    }
+
+    /// Whether a parameter changes with the size.
+    pub(super) fn moves(&self, parameter: usize) -> bool {
+        self.along(1.0)[parameter] != 0.0
+    }
+
+    /// The parameter that alone changes with the size; `None` where several do.
+    pub(super) fn only_moving(&self) -> Option<usize> {
+        let mut moving = (0..self.direction.len()).filter(|&parameter| self.moves(parameter));
+        moving.next().filter(|_| moving.next().is_none())
     }
 
     /// Whether it is the same effect, of a vector in the same direction.
@@ -429,6 +468,29 @@ mod tests {
         // Twenty-four places a wall, chosen before.
         is("wall-bump", 1, 0.008 / STEP);
         is("wall-bump", 0, 0.024);
+    }
+
+    #[test]
+    fn a_vector_is_as_large_as_it_reaches_along_its_direction() {
+        let probes = probes();
+        let offsets: Vec<&Probe> = (probes.iter())
+            .filter(|probe| probe.spec.name == "camera-offset")
+            .collect();
+        assert_eq!(offsets.len(), 4);
+        for probe in &offsets {
+            assert!((probe.size_of(&probe.values(0.0015)) - 0.0015).abs() < 1e-15);
+        }
+        let only: Vec<Option<usize>> = offsets.iter().map(|probe| probe.only_moving()).collect();
+        assert_eq!(only, [Some(0), None, Some(1), None]);
+        // 3 mm to the left and 1 mm back, in a direction half back and half left.
+        let size = offsets[3].size_of(&[-0.001, 0.003]);
+        assert!((size - 0.004 * std::f64::consts::FRAC_1_SQRT_2).abs() < 1e-15);
+        let along = offsets[2].along(1e-5);
+        assert_eq!(along, [0.0, 1e-5]);
+        assert!(offsets[2].is_size(0) && offsets[2].is_size(1));
+        let light = probes.iter().find(|probe| probe.spec.name == "directional-light");
+        let sizes: Vec<bool> = light.map_or(Vec::new(), |light| vec![light.is_size(0), light.is_size(1)]);
+        assert_eq!(sizes.iter().filter(|is_size| **is_size).count(), 1);
     }
 
     #[test]

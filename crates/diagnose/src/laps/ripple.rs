@@ -114,6 +114,7 @@ impl Trial<'_> {
 
     fn spectra(&self, hypothesis: &Hypothesis, sets: u64) -> Option<Vec<DVector<f64>>> {
         let settings = hypothesis.settings(self.atlas);
+        self.atlas.spent.add(sets);
         (0..sets)
             .into_par_iter()
             .map(|set| (self.simulate)(&settings, set).map(|runs| spectrum(&runs)))

@@ -105,7 +105,10 @@ impl Atlas {
         let mut runs = 0;
         for (recording, laps) in self.layout.laps.iter().enumerate() {
             let of_run = self.layout.run(runs);
-            let factor = (laps.len() as f64 / laps[0] as f64).sqrt() * ramp_norm(laps[0]);
+            // The mean laps are in units of the first run's error, the trends are means over the runs in those of such a mean.
+            let runs_here = laps.len() as f64;
+            let growth = laps.iter().map(|&n| ramp_norm(n)).sum::<f64>() / runs_here;
+            let factor = (runs_here / laps[0] as f64).sqrt() * growth;
             change
                 .rows_mut(self.layout.trend(recording).start, self.layout.lap)
                 .axpy(factor, &tangent.rows(of_run.start, of_run.len()), 1.0);
@@ -145,7 +148,8 @@ impl Atlas {
                         .copy_from(&part.rows(range.start, range.len()));
                 }
                 let sizes = parts.into_iter().map(|part| part.0).collect();
-                (sizes, action, p.free.len() - 1 + runs)
+                let by_run = p.free.iter().filter(|free| p.moves(free.0)).count();
+                (sizes, action, p.free.len() + by_run * (runs - 1))
             }
             // What changes in time by itself is no candidate for a change of that change.
             Shape::ByTime if p.drifts() => return None,

@@ -39,13 +39,6 @@ pub(super) struct Found {
     residual: White,
 }
 
-impl Found {
-    /// Whether nothing significant is left.
-    pub(super) fn fits(&self) -> bool {
-        (self.explanation.remainder_p).is_some_and(|p| p >= SIGNIFICANT_P)
-    }
-}
-
 /// A search for explanations of one data set.
 pub(super) struct Search<'a> {
     pub(super) trial: Trial<'a>,
@@ -229,24 +222,32 @@ impl Search<'_> {
         self.try_rounds(starts.iter(), &ROUNDS_OF_SEVERAL)
     }
 
-    /// What an explanation leaves from run to run, and of a trend, along what it does to the mean lap: one number a run, which
-    /// shows what is lost among all the numbers of a lap.
+    /// What an explanation leaves from run to run, and of a trend, along what it does to the mean lap of each recording: one number
+    /// a run, which shows what is lost among all the numbers of a lap.
     fn along_its_action(&self, found: &Found) -> [Quadratic; 2] {
         let layout = &self.atlas().layout;
         let action = self.residual - &found.left;
-        let mut along = White::zeros(layout.lap);
-        for run in (0..layout.runs()).map(|run| layout.run(run)) {
-            along += action.rows(run.start, run.len());
+        let recordings = layout.laps.len();
+        let (mut squares, mut trends) = (0.0, 0.0);
+        for recording in 0..recordings {
+            let runs: Vec<Range<usize>> = (layout.places().enumerate())
+                .filter(|(_, place)| place.0 == recording)
+                .map(|(run, _)| layout.run(run))
+                .collect();
+            let mut along = White::zeros(layout.lap);
+            for run in &runs {
+                along += action.rows(run.start, run.len());
+            }
+            let along = along.normalize();
+            let size = |range: &Range<usize>| along.dot(&found.residual.rows(range.start, range.len()));
+            let sizes: Vec<f64> = runs.iter().map(size).collect();
+            let mean = sizes.iter().sum::<f64>() / sizes.len() as f64;
+            squares += sizes.iter().map(|size| (size - mean).powi(2)).sum::<f64>();
+            trends += size(&layout.trend(recording)).powi(2);
         }
-        let along = along.normalize();
-        let size = |range: Range<usize>| along.dot(&found.residual.rows(range.start, range.len()));
-        let sizes: Vec<f64> = (0..layout.runs()).map(|run| size(layout.run(run))).collect();
-        let trends = (0..layout.laps.len()).map(|recording| size(layout.trend(recording)).powi(2));
-        let mean = sizes.iter().sum::<f64>() / sizes.len() as f64;
-        let squares = sizes.iter().map(|size| (size - mean).powi(2));
         [
-            Quadratic::new(squares.sum(), sizes.len() - 1),
-            Quadratic::new(trends.sum(), layout.laps.len()),
+            Quadratic::new(squares, layout.runs() - recordings),
+            Quadratic::new(trends, recordings),
         ]
     }
 

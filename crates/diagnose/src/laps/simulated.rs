@@ -96,6 +96,7 @@ impl Trial<'_> {
         /// Share of the data sets that must be whole.
         const ENOUGH: f64 = 0.75;
         let sets = self.atlas.enough(FINAL_SETS, 1);
+        self.atlas.spent.add(sets);
         let found: Vec<(Summary, &Expectation)> = (0..sets)
             .into_par_iter()
             .filter_map(|set| {
@@ -168,6 +169,7 @@ impl Atlas {
         settings: &[Setting],
         sets: Range<u64>,
     ) -> Option<Vec<Summary>> {
+        self.spent.add(sets.end - sets.start);
         sets.into_par_iter()
             .map(|set| self.summary(simulate, settings, set))
             .collect()

@@ -6,8 +6,10 @@ use super::atlas::{NULL_SETS, White};
 use super::layout::Layout;
 use super::summary::SECOND;
 
+/// Omnibus probability below which a data set counts as departing from the declared model.
+pub(super) const ALARM_P: f64 = 0.002;
 /// Probability of what is left below which it is significant.
-pub(super) const SIGNIFICANT_P: f64 = 0.001;
+pub(crate) const SIGNIFICANT_P: f64 = 0.001;
 /// Probability of what is left below which nothing short of another effect helps.
 pub(super) const HOPELESS_P: f64 = 1e-12;
 
@@ -110,6 +112,22 @@ impl FourNumbers {
         let q = self.all().iter().map(|number| number.q).sum();
         let freedom = self.all().iter().map(|number| number.freedom).sum();
         Quadratic::new(q, freedom)
+    }
+
+    /// The four with their names in files.
+    pub fn named(&self) -> [(&'static str, &Quadratic); 4] {
+        [
+            ("mean", &self.mean),
+            ("runs", &self.runs),
+            ("trend", &self.trend),
+            ("noise", &self.noise),
+        ]
+    }
+
+    /// The names of those that depart from what is expected.
+    pub fn departing(&self) -> Vec<&'static str> {
+        let departing = self.named().into_iter().filter(|(_, number)| number.p < ALARM_P);
+        departing.map(|(name, _)| name).collect()
     }
 
     /// Whether chance alone often makes as much of all four together.
