@@ -444,8 +444,8 @@ impl<'a> Search<'a> {
         };
     }
 
-    /// Notes what is left beside a cause without a name. A wheel out of round has another angle in each run, and what the runs have in
-    /// common of it, its amplitude, leaves nothing to be looked at.
+    /// Notes what is left beside a cause without a name. Not beside a wheel out of round: it begins each run at another angle, and its
+    /// amplitude alone, which the runs share, cannot be filtered.
     fn settle_beside_unnamed(&mut self) {
         let unnamed = self.unnamed.as_ref().filter(|unnamed| !unnamed.is_a_wheel());
         let Some(refined) = unnamed.and_then(|unnamed| unnamed.refined.clone()) else {
