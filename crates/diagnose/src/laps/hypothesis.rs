@@ -349,24 +349,19 @@ impl Part {
         for (i, &(parameter, _)) in probe.free.iter().enumerate() {
             let quantum = probe.quantum.filter(|_| i == 0);
             let step = quantum.unwrap_or(probe.step_at(i, size) * self.stride);
-            if probe.moves(parameter) && self.shape == Shape::ByRun {
-                let parameter = Some(parameter);
-                freedoms.extend((0..runs).map(|run| Freedom {
-                    part,
-                    run: Some(run),
-                    parameter,
-                    step,
-                    quantum,
-                }));
+            let goes_by_run = self.shape == Shape::ByRun && probe.moves(parameter);
+            let of = if goes_by_run {
+                (0..runs).map(Some).collect()
             } else {
-                freedoms.push(Freedom {
-                    part,
-                    run: None,
-                    parameter: Some(parameter),
-                    step,
-                    quantum,
-                });
-            }
+                vec![None]
+            };
+            freedoms.extend(of.into_iter().map(|run| Freedom {
+                part,
+                run,
+                parameter: Some(parameter),
+                step,
+                quantum,
+            }));
         }
         if self.shape == Shape::ByTime {
             let run_s = atlas.run_laps() * atlas.lap_s();
