@@ -8,8 +8,9 @@ use sim::Setting;
 
 use super::atlas::{Atlas, White, in_other_units, white};
 use super::expectation::{Expectation, Scatter};
-use super::hypothesis::{Freedom, Hypothesis, Part};
+use super::hypothesis::Hypothesis;
 use super::parabola::groups;
+use super::part::{Freedom, Part};
 use super::refine::Descent;
 use super::screen::{Screened, without_directions};
 use super::search::{Search, WEAK};

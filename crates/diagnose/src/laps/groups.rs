@@ -4,7 +4,8 @@ use nalgebra::{DMatrix, DVector};
 use sim::UNLISTED;
 
 use super::atlas::White;
-use super::hypothesis::{Hypothesis, Part};
+use super::hypothesis::Hypothesis;
+use super::part::Part;
 use super::probe::Probe;
 use super::screen::price;
 use super::steadiness::Settling;

@@ -7,7 +7,8 @@ use rayon::prelude::*;
 
 use super::atlas::{Atlas, White};
 use super::beside::Base;
-use super::hypothesis::{Hypothesis, Part};
+use super::hypothesis::Hypothesis;
+use super::part::Part;
 use super::simulated::FINAL_SETS;
 use super::trial::Trial;
 

@@ -1,8 +1,9 @@
 //! Intervals of numbers of which the likelihood falls far more slowly than the parabola about its top: where no reading is cut at
 //! zero any more, or no wheel reaches a limit, a still larger size does nothing further, and laps do not bound it.
 
-use super::hypothesis::{Freedom, Hypothesis};
+use super::hypothesis::Hypothesis;
 use super::parabola::{Column, Local};
+use super::part::Freedom;
 use super::trial::Trial;
 use crate::candidate::HALF_WIDTH_95;
 

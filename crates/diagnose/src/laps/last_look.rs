@@ -2,10 +2,11 @@
 
 use sim::Setting;
 
-use super::hypothesis::{Freedom, Hypothesis};
+use super::hypothesis::Hypothesis;
 use super::intervals::Interval;
 use super::observed::ObservedLap;
 use super::parabola::{Column, Local, Nearest};
+use super::part::Freedom;
 use super::refine::are_within_steps;
 use super::trial::Trial;
 use crate::Error;

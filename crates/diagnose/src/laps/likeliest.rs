@@ -1,8 +1,9 @@
 //! The most likely size of an effect that does little, by the likelihood itself.
 
-use super::hypothesis::{Freedom, Hypothesis};
+use super::hypothesis::Hypothesis;
 use super::likelihood::Fit;
 use super::parabola::{Local, Sides};
+use super::part::Freedom;
 use super::refine::SETTLED;
 use super::simulated::Evaluated;
 use super::trial::Trial;

@@ -12,6 +12,7 @@ mod atlas;
 mod hypothesis;
 mod likelihood;
 mod memo;
+mod part;
 mod probe;
 mod simulated;
 mod trial;
@@ -36,7 +37,9 @@ mod refine;
 // The search through all that, and the answer.
 mod classes;
 mod diagnosis;
+mod rounds;
 mod search;
+mod singles;
 
 // What is said beside the answer.
 mod baseline;

@@ -5,12 +5,12 @@ use rayon::prelude::*;
 
 use super::atlas::{Atlas, White};
 use super::hunt::Hunt;
-use super::hypothesis::{Hypothesis, Part, Shape};
+use super::hypothesis::Hypothesis;
+use super::part::{Part, Shape};
 use super::refine::Descent;
+use super::rounds::{ROUNDS_BESIDE, ROUNDS_OF_SEVERAL, Rung, best_of};
 use super::screen::{BEYOND, Screened, price, tangent};
-use super::search::{
-    BASES, Found, ROUNDS_BESIDE, ROUNDS_OF_SEVERAL, Rung, STRONG, Search, best_of, of_other_effects,
-};
+use super::search::{BASES, Found, STRONG, Search, of_other_effects};
 
 /// A straight piece of a probe's path.
 pub(super) struct Piece {

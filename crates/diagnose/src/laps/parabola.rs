@@ -7,9 +7,10 @@ use nalgebra::{DMatrix, DVector};
 
 use super::atlas::{Atlas, White, white};
 use super::expectation::{Expectation, Scatter};
-use super::hypothesis::{Freedom, Hypothesis};
+use super::hypothesis::Hypothesis;
 use super::layout::Layout;
 use super::likelihood::{Doubt, Fit};
+use super::part::Freedom;
 use super::simulated::Evaluated;
 use super::trial::Trial;
 
@@ -129,7 +130,7 @@ pub(super) fn groups(freedoms: &[Freedom]) -> Vec<Vec<Freedom>> {
     let mut groups: Vec<Vec<Freedom>> = Vec::new();
     for freedom in freedoms {
         match groups.last_mut() {
-            Some(group) if freedom.run().is_some() && freedom.is_beside(&group[0]) => group.push(*freedom),
+            Some(group) if freedom.run.is_some() && freedom.is_beside(&group[0]) => group.push(*freedom),
             _ => groups.push(vec![*freedom]),
         }
     }
@@ -139,14 +140,14 @@ pub(super) fn groups(freedoms: &[Freedom]) -> Vec<Vec<Freedom>> {
 impl Freedom {
     /// Its own share of the action of its group.
     pub(super) fn own_share(&self, action: &White, layout: &Layout) -> White {
-        self.run()
+        self.run
             .map_or_else(|| action.clone(), |run| of_run(action, run, layout))
     }
 
     /// Its share of what its group does to the scatter of a recording's laps.
     fn share_of_scatter(&self, recording: usize, layout: &Layout) -> f64 {
         let runs = layout.laps[recording].len() as f64;
-        match self.run().and_then(|run| layout.places().nth(run)) {
+        match self.run.and_then(|run| layout.places().nth(run)) {
             None => 1.0,
             Some((own, _)) if own == recording => 1.0 / runs,
             Some(_) => 0.0,

@@ -5,10 +5,11 @@ use rayon::prelude::*;
 use sim::Stage;
 
 use super::atlas::Atlas;
-use super::hypothesis::{Freedom, Hypothesis, Part, Shape};
+use super::hypothesis::Hypothesis;
 use super::likeliest::Likeliest;
 use super::likelihood::Fit;
 use super::parabola::{Column, Local, Nearest};
+use super::part::{Freedom, Part, Shape};
 use super::screen::price;
 use super::simulated::Evaluated;
 use super::tests_of_fit::{FourNumbers, HOPELESS_P, SIGNIFICANT_P};

@@ -10,8 +10,9 @@ use rayon::prelude::*;
 use statrs::statistics::{Data, OrderStatistics};
 
 use super::atlas::Atlas;
-use super::hypothesis::{Hypothesis, Part};
+use super::hypothesis::Hypothesis;
 use super::observed::ObservedLap;
+use super::part::Part;
 use super::summary::{BLOCKS, deviations, lap_vector};
 use super::tests_of_fit::Quadratic;
 use super::trial::Trial;

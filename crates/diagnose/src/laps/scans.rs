@@ -9,10 +9,12 @@ use sim::Setting;
 use super::atlas::{Atlas, White};
 use super::beside::{Base, difference, explains};
 use super::hunt::{Hunt, Look};
-use super::hypothesis::{Hypothesis, Part, Shape};
+use super::hypothesis::Hypothesis;
 use super::pairs::{Columns, Piece};
+use super::part::{Part, Shape};
 use super::refine::Descent;
-use super::search::{BASES, Found, ROUNDS_OF_SEVERAL, Search, near, sort};
+use super::rounds::{ROUNDS_OF_SEVERAL, near};
+use super::search::{BASES, Found, Search, sort};
 use super::trial::Trial;
 
 /// Pairs with an effect that jumps that are simulated before the best few are tried.

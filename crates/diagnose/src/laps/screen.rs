@@ -6,8 +6,9 @@ use rayon::prelude::*;
 use sim::UNLISTED;
 
 use super::atlas::{Atlas, White};
-use super::hypothesis::{Hypothesis, Part, Shape};
+use super::hypothesis::Hypothesis;
 use super::layout::ramp_norm;
+use super::part::{Part, Shape};
 
 /// A probe at the size that explains most.
 #[derive(Debug, Clone)]
