@@ -307,6 +307,11 @@ fn runs_that_cannot_be_read() {
             "run_a.csv:3: t_s: 0.5 does not come after 1 of the row before; times must rise".to_owned(),
         ),
         ("t_s,x_m,y_m\n", "run_a.csv: no rows under the header; a run needs one for each control step".to_owned()),
+        ("0,1,2\n0.064,1,2\n", "run_a.csv:1: a row of numbers; a line with the names of the columns must come first".to_owned()),
+        (
+            "t_s,x_m,y_m\n0,,\n0.064,,\n",
+            "run_a.csv: x_m and y_m are empty in every row: the camera did not see the robot at all".to_owned(),
+        ),
         ("", "run_a.csv is empty; a line with the names of the columns must come first".to_owned()),
         ("t_s,x_m,y_m\n0,1,1\n0.064,1,1\n", format!("run_a.csv: {blind}")),
         (
@@ -335,6 +340,18 @@ fn data_sets_that_do_not_say_what_they_are() {
         (
             with("[declared]\ncontroller.gian_per_count = 1"),
             "6: unknown key `controller.gian_per_count`; nearest known: controller.gain_per_count",
+        ),
+        (
+            with("[declared]\nslip.level = 5"),
+            "6: slip.level = 5 is outside [0, 1]",
+        ),
+        (
+            with("[declared]\n\nworld = \"other\""),
+            "7: [declared] world: `world` of the data set says that; remove it here",
+        ),
+        (
+            with("[declared.controller]\nkind = \"rule-based\""),
+            "6: [declared] controller.kind: `controller` of the data set says that; remove it here",
         ),
         (
             DATASET.replace("\"braitenberg\"", "\"breitenberg\""),
@@ -505,7 +522,8 @@ fn laps_that_skip_a_gate_are_set_aside_and_named() {
     let ran = scratch.done(["compare", "set", "--permutations", "0", "--json"]);
     assert_eq!(
         ran.stderr,
-        "lapwing: set/a: lap 2 misses gate 16 and is set aside\nlapwing: set/a: 5 of 6 laps\n"
+        "lapwing: set/run_a.csv:2808: from here on the robot is not seen for 14.5 s: lap 2 misses gate 16 and is set aside\n\
+         lapwing: set/a: 5 of 6 laps\n"
     );
     let document: serde_json::Value = serde_json::from_str(&ran.stdout).unwrap();
     assert_eq!(
@@ -516,7 +534,21 @@ fn laps_that_skip_a_gate_are_set_aside_and_named() {
     scratch.write("set/run_a.csv", cut(&run, |lap| (1..7).contains(&lap)));
     let ran = scratch.run(["compare", "set", "--out", "o"]);
     assert_eq!((ran.status, ran.stdout.as_str()), (Some(2), ""));
-    let expected = (1..6).map(|lap| format!("lapwing: set/a: lap {lap} misses gate 16 and is set aside\n"));
+    let expected = [
+        (1500, 14.3),
+        (2360, 14.5),
+        (3219, 14.5),
+        (4077, 14.5),
+        (4938, 14.5),
+    ]
+    .iter()
+    .zip(1..);
+    let expected = expected.map(|((line, for_s), lap)| {
+        format!(
+            "lapwing: set/run_a.csv:{line}: from here on the robot is not seen for {for_s} s: lap {lap} misses gate 16 and \
+             is set aside\n"
+        )
+    });
     let expected = expected.collect::<String>()
         + "lapwing: set/a: 1 of 6 laps\n\
            lapwing: `set/a` has 1 lap, `set/b` has 6 laps: 2 modes or gates need at least 2 laps each and 4 together; \
@@ -527,7 +559,8 @@ fn laps_that_skip_a_gate_are_set_aside_and_named() {
     scratch.write("set/run_a.csv", cut(&run, |lap| lap > 0));
     scratch.refuses(
         &["compare", "set", "--out", "o"],
-        "set/run_a.csv: no lap crosses all gates: lap 1 misses gate 16; is this the world it was driven in?",
+        "set/run_a.csv:1500: from here on the robot is not seen for 14.3 s: lap 1 misses gate 16 and is set aside, and none \
+         is left; measure the run again",
     );
 }
 

@@ -47,6 +47,20 @@ fn runs_of_unequal_length_are_traced() {
 fn two_laps_are_too_few() {
     let scratch = Scratch::new();
     few_laps(&[3, 2]).record(&scratch, "set");
+    let description = scratch.read("set/dataset.toml");
+    scratch.write(
+        "one_lap/dataset.toml",
+        description.replace("laps = 3", "laps = 1"),
+    );
+    for run in ["run_a.csv", "run_b.csv"] {
+        scratch.write(&format!("one_lap/{run}"), scratch.read(&format!("set/{run}")));
+    }
+    let ran = try_trace(&scratch, "braitenberg", "one_lap", &[]);
+    assert!(
+        ran.stderr.contains("raise `laps` in dataset.toml"),
+        "{}",
+        ran.stderr
+    );
     scratch.refuses(
         &[
             "trace",
@@ -80,7 +94,6 @@ fn rewrite(scratch: &Scratch, run: &str, change: impl Fn(usize, Vec<String>) -> 
 #[test]
 fn a_log_with_gaps_is_traced() {
     let scratch = Scratch::new();
-    // Laps with a gap miss gates and are set aside: three or more are left.
     limping().logged(&[6; 3]).record(&scratch, "set");
     let emptied = |fields: &mut [String]| fields.iter_mut().for_each(String::clear);
     for (run, first) in [("set/run_a.csv", 700), ("set/run_b.csv", 1900)] {
@@ -98,6 +111,107 @@ fn a_log_with_gaps_is_traced() {
     let found = trace(&scratch, "braitenberg", "set", &[]);
     says(&found, "explained", &["wheel-asymmetry"]);
     holds(&found["effects"][0], "ratio", LIMPING, 1.0);
+}
+
+/// The robot that the model declares.
+fn as_declared() -> Robot {
+    Robot {
+        effects: Vec::new(),
+        ..limping()
+    }
+}
+
+/// The remarks of a trace.
+fn remarks(found: &Value) -> Vec<&str> {
+    let remarks = found["remarks"].as_array().unwrap();
+    remarks.iter().map(|remark| remark.as_str().unwrap()).collect()
+}
+
+#[test]
+fn a_robot_that_was_not_always_seen_is_no_other_robot() {
+    let scratch = Scratch::new();
+    let not_seen = |fields: &mut [String]| fields[1..3].iter_mut().for_each(String::clear);
+    for (folder, robot) in [("faithful", as_declared()), ("limping", limping())] {
+        robot.logged(&[5; 3]).record(&scratch, folder);
+        for run in ["a", "b", "c"] {
+            // A second and more in every eight, elsewhere in each lap, and each run.
+            let first = 17 * usize::from(run.as_bytes()[0]);
+            rewrite(&scratch, &format!("{folder}/run_{run}.csv"), |row, mut fields| {
+                if (row + first) % 127 < 20 && row > 20 {
+                    not_seen(&mut fields);
+                }
+                Some(fields)
+            });
+        }
+    }
+    let found = trace(&scratch, "braitenberg", "faithful", &[]);
+    says(&found, "faithful", &[]);
+    for run in ["a", "b", "c"] {
+        let said = format!("Run faithful/{run}: the camera did not see the robot on 1");
+        assert!(
+            remarks(&found).iter().any(|remark| remark.starts_with(&said)),
+            "{found:#}"
+        );
+    }
+    let error = |key: &str| found["error"][key].as_f64().unwrap();
+    assert!(error("before") < 1.5 * error("floor"), "{}", found["error"]);
+    let found = trace(&scratch, "braitenberg", "limping", &[]);
+    says(&found, "explained", &["wheel-asymmetry"]);
+    holds(&found["effects"][0], "ratio", LIMPING, 1.0);
+}
+
+#[test]
+fn laps_in_which_the_robot_was_out_of_sight_are_set_aside() {
+    let scratch = Scratch::new();
+    as_declared().logged(&[6; 3]).record(&scratch, "set");
+    let description = scratch.read("set/dataset.toml").replace("laps = 6", "laps = 5");
+    scratch.write("set/dataset.toml", description);
+    rewrite(&scratch, "set/run_b.csv", |row, mut fields| {
+        if (3000..3500).contains(&row) {
+            fields[1..3].iter_mut().for_each(String::clear);
+        }
+        Some(fields)
+    });
+    let found = trace(&scratch, "braitenberg", "set", &[]);
+    says(&found, "faithful", &[]);
+    let said = "set/run_b.csv:3001: from here on the robot is not seen for 32.1 s: lap ";
+    assert!(remarks(&found)[0].starts_with(said), "{found:#}");
+}
+
+#[test]
+fn values_that_no_robot_writes_are_taken_as_missing_and_said() {
+    let scratch = Scratch::new();
+    as_declared().logged(&[5; 2]).record(&scratch, "set");
+    // Columns 3 to 10 are the readings, 11 and 12 the commands.
+    let spoilt = [
+        (1000, 5, "99999", "ps2 is 99999, which this robot cannot write"),
+        (1500, 5, "-50", "ps2 is -50, which this robot cannot write"),
+        (
+            2000,
+            7,
+            "3000",
+            "ps4 is 3000, far from what it is in the rows before and after",
+        ),
+        (2500, 11, "5.0", "left_m_s is 5, which this robot cannot write"),
+        (
+            3000,
+            12,
+            "-0.1",
+            "the command does not follow from the readings as those of the other rows do",
+        ),
+    ];
+    rewrite(&scratch, "set/run_b.csv", |row, mut fields| {
+        for (_, column, value, _) in spoilt.iter().filter(|(at, ..)| *at == row) {
+            fields[*column] = (*value).to_owned();
+        }
+        Some(fields)
+    });
+    let found = trace(&scratch, "braitenberg", "set", &[]);
+    says(&found, "faithful", &[]);
+    let expected: Vec<String> = (spoilt.iter())
+        .map(|(row, _, _, why)| format!("set/run_b.csv:{}: {why}; taken as missing", row + 2))
+        .collect();
+    assert_eq!(remarks(&found), expected);
 }
 
 #[test]
@@ -240,6 +354,19 @@ fn a_run_that_is_given_twice_is_refused() {
         let said = "set/run_a.csv: the same run as set/run_a.csv; give each run once";
         assert!(ran.stderr.contains(said), "{}", ran.stderr);
     }
+    // Packed, or written otherwise, it is the same run.
+    few_laps(&[3; 2]).record(&scratch, "again");
+    rewrite(&scratch, "again/run_a.csv", |_, mut fields| {
+        fields[0] += "0";
+        Some(fields)
+    });
+    let ran = try_trace(&scratch, "braitenberg", "set", &["--held-out", "again"]);
+    let said = "again/run_a.csv: the same run as set/run_a.csv; give each run once";
+    assert!(
+        ran.status == Some(2) && ran.stderr.contains(said),
+        "{}",
+        ran.stderr
+    );
 }
 
 #[test]
@@ -258,7 +385,7 @@ fn a_sighting_where_no_robot_gets_is_set_aside_and_said() {
     holds(&found["effects"][0], "ratio", LIMPING, 1.0);
     let remark = found["remarks"][0].as_str().unwrap();
     assert!(
-        remark.contains("set/run_b.csv: at t_s = 192.000 the robot is seen at (57.3, ")
+        remark.contains("set/run_b.csv:3002: the robot is seen at (57.3, ")
             && remark.ends_with("taken as not seen"),
         "{remark}"
     );

@@ -28,7 +28,7 @@ pub(crate) struct Global {
     /// Threads to work with; the results do not depend on it [default: all cores]
     #[arg(long, global = true, value_parser = clap::value_parser!(u16).range(1..))]
     pub(crate) threads: Option<u16>,
-    /// No progress on stderr
+    /// Nothing on stderr but errors: no progress, and no remarks on the data
     #[arg(long, short, global = true)]
     pub(crate) quiet: bool,
 }

@@ -17,6 +17,7 @@ use crate::output::Input;
 
 pub(crate) use csv_file::CsvFile;
 pub(crate) use description::Kind;
+pub(crate) use read::LOG_COLUMNS;
 use source::{Shipped, Source};
 pub(crate) use write::{DataSetToWrite, run_name, write_dataset};
 
@@ -54,6 +55,15 @@ pub(crate) struct RunFile {
     pub(crate) name: String,
     pub(crate) path: PathBuf,
     pub(crate) rows: Rows,
+    /// Line of each row in the file.
+    lines: Vec<usize>,
+}
+
+impl RunFile {
+    /// File and line of a row, for messages.
+    pub(crate) fn place(&self, row: usize) -> String {
+        format!("{}:{}", self.path.display(), self.lines[row])
+    }
 }
 
 /// A run, one row per control step: T rows in all.
@@ -83,6 +93,11 @@ impl Rows {
     pub(crate) fn since_start_s(&self) -> impl Iterator<Item = f64> {
         let first = self.t_s.first().copied().unwrap_or_default();
         self.t_s.iter().map(move |t_s| t_s - first)
+    }
+
+    /// Whether a camera saw the same of two runs.
+    pub(crate) fn is_seen_as(&self, other: &Self) -> bool {
+        self.t_s == other.t_s && self.position_m == other.position_m
     }
 }
 
@@ -182,8 +197,14 @@ pub(crate) fn load_run_csv(path: &Path) -> Result<DataSet> {
 }
 
 fn load_run(source: Source<'_>, name: String, path: PathBuf) -> Result<(RunFile, Input)> {
-    let (rows, input) = read::run(&path, &source.read(&path)?)?;
-    Ok((RunFile { name, path, rows }, input))
+    let (rows, lines, input) = read::run(&path, &source.read(&path)?)?;
+    let run = RunFile {
+        name,
+        path,
+        rows,
+        lines,
+    };
+    Ok((run, input))
 }
 
 /// The folder of a file; that of a bare file name is the working folder.

@@ -11,7 +11,7 @@ use track::{Lap, LapTracker, Way};
 use crate::config::Config;
 use crate::dataset::{DataSet, RunFile};
 use crate::setup;
-use crate::strays::without_strays;
+use crate::sightings::{long_holes, lost_in_words, without_strays};
 
 /// The laps of one run that are analysed, and what was set aside.
 #[derive(Debug, Clone)]
@@ -24,6 +24,8 @@ pub(crate) struct SampledRun {
     pub(crate) laps: Vec<Lap>,
     /// Whole laps that missed a gate: number of the lap from 1 (the dropped one is 0) and the gate.
     pub(crate) set_aside: Vec<(usize, usize)>,
+    /// Whole laps that were not seen for too long, in words.
+    pub(crate) out_of_sight: Vec<String>,
     /// Laps asked for.
     pub(crate) wanted: usize,
     /// Whether the run ended because gate 0 was not crossed for too long.
@@ -33,18 +35,29 @@ pub(crate) struct SampledRun {
 }
 
 impl SampledRun {
-    /// The laps to keep among all whole laps of a run, in order: the first is dropped, those that miss a gate are set
-    /// aside, and of the others the first `wanted` kept.
-    pub(crate) fn new(set: &str, run: &str, whole: &[Lap], wanted: usize) -> Self {
+    /// The laps to keep among all whole laps of a run, in order: the first is dropped, those that miss a gate, or in which
+    /// the robot is `lost` (by the lap's number, in words), are set aside, and of the others the first `wanted` kept.
+    pub(crate) fn new(
+        set: &str,
+        run: &str,
+        whole: &[Lap],
+        wanted: usize,
+        lost: impl Fn(usize) -> Option<String>,
+    ) -> Self {
         let mut laps = Vec::with_capacity(wanted);
-        let mut set_aside = Vec::new();
+        let (mut set_aside, mut out_of_sight) = (Vec::new(), Vec::new());
         for (number, lap) in whole.iter().enumerate().skip(1) {
             if laps.len() == wanted {
                 break;
             }
-            match lap.missed.first() {
-                Some(&gate) => set_aside.push((number, gate)),
-                None => laps.push(lap.clone()),
+            let missed = lap.missed.first().map(|gate| format!(" misses gate {gate} and"));
+            if let Some(words) = lost(number) {
+                let missed = missed.unwrap_or_default();
+                out_of_sight.push(format!("{words}: lap {number}{missed} is set aside"));
+            } else if let Some(&gate) = lap.missed.first() {
+                set_aside.push((number, gate));
+            } else {
+                laps.push(lap.clone());
             }
         }
         Self {
@@ -52,6 +65,7 @@ impl SampledRun {
             run: run.to_owned(),
             laps,
             set_aside,
+            out_of_sight,
             wanted,
             timed_out: false,
             strays: Vec::new(),
@@ -91,13 +105,18 @@ impl SampledRun {
         self.laps.iter().map(Lap::duration_s).collect()
     }
 
+    /// The laps that are set aside, and why, in words.
+    pub(crate) fn laps_set_aside(&self) -> impl Iterator<Item = String> {
+        let misses = |(lap, gate): &(usize, usize)| {
+            format!("{}: lap {lap} misses gate {gate} and is set aside", self.name)
+        };
+        (self.out_of_sight.iter().cloned()).chain(self.set_aside.iter().map(misses))
+    }
+
     /// What a user must know of laps that are not there, if anything.
     pub(crate) fn remarks(&self) -> Vec<String> {
         let mut remarks = self.strays.clone();
-        remarks.extend(
-            (self.set_aside.iter())
-                .map(|(lap, gate)| format!("{}: lap {lap} misses gate {gate} and is set aside", self.name)),
-        );
+        remarks.extend(self.laps_set_aside());
         if self.laps.len() < self.wanted {
             let ending = if self.timed_out {
                 " (the run timed out)"
@@ -177,9 +196,17 @@ fn sample(set: &DataSet, run: &RunFile, circuit: &Circuit, way: Way) -> Result<S
     let whole: Vec<Lap> = seen(run)
         .filter_map(|(time_s, position)| tracker.push(time_s, position))
         .collect();
-    let sampled = SampledRun::new(&set.name, &run.name, &whole, set.laps);
+    let holes = long_holes(run, &whole);
+    let lost = |number: usize| lost_in_words(run, &holes, &whole, number);
+    let sampled = SampledRun::new(&set.name, &run.name, &whole, set.laps, lost);
     if sampled.laps.is_empty() {
         let path = run.path.display();
+        if seen(run).next().is_none() {
+            bail!("{path}: x_m and y_m are empty in every row: the camera did not see the robot at all");
+        }
+        if let Some(lap) = sampled.out_of_sight.first() {
+            bail!("{lap}, and none is left; measure the run again");
+        }
         if let Some((lap, gate)) = sampled.set_aside.first() {
             bail!(
                 "{path}: no lap crosses all gates: lap {lap} misses gate {gate}; is this the world it was driven in?"
@@ -205,7 +232,7 @@ pub(crate) fn simulated(name: &str, run: usize, drive: &Drive, wanted: usize) ->
         .chain(&drive.laps)
         .cloned()
         .collect();
-    let sampled = SampledRun::new(name, &crate::dataset::run_name(run), &whole, wanted);
+    let sampled = SampledRun::new(name, &crate::dataset::run_name(run), &whole, wanted, |_| None);
     SampledRun {
         timed_out: drive.timed_out,
         ..sampled
@@ -237,7 +264,7 @@ mod tests {
             }
         };
         let whole: Vec<Lap> = (0..4).map(lap).collect();
-        SampledRun::new("set", "a", &whole, 3)
+        SampledRun::new("set", "a", &whole, 3, |_| None)
     }
 
     #[test]

@@ -17,7 +17,7 @@ mod ray_study;
 mod report;
 mod session;
 mod setup;
-mod strays;
+mod sightings;
 mod table;
 mod trace;
 

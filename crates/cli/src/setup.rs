@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use anyhow::{Context, Result, anyhow};
-use diagnose::ObservedLap;
+use diagnose::{ObservedLap, Unseen};
 use sim::{
     Beam, CasterKind, Circuit, Drive, Machine, Model, Mount, Pattern, ReadingNoise, Response, Robot,
     RunRules, Scene, Setting, Step, Streams, Vec2, WallRules,
@@ -52,6 +52,17 @@ impl Setup {
     ) -> Result<Drive, sim::Error> {
         let world = self.scene.world(&self.model, streams.run as usize)?;
         sim::drive(&world, streams, laps, record)
+    }
+
+    /// Laps on a path of times in s and positions in m as a camera sees them from which parts of them are hidden, and the path
+    /// too.
+    pub(crate) fn seen_through(
+        &self,
+        unseen: &Unseen,
+        laps: Vec<Lap>,
+        path: &mut Vec<(f64, Vec2)>,
+    ) -> Vec<Lap> {
+        unseen.through(laps, path, &self.scene.circuit().gates, self.model.run.way)
     }
 
     /// Laps that were seen on a path of times in s and positions in m, as a diagnosis takes them.
@@ -116,12 +127,21 @@ pub(crate) fn way(config: &Config, course: &Course) -> Way {
     })
 }
 
+/// Whether a configuration states a model.
+pub(crate) fn check(config: &Config) -> Result<(), sim::Error> {
+    model_going(config, Way::Forward).map(|_| ())
+}
+
 /// The model that a configuration states.
 pub(crate) fn model(config: &Config, circuit: &Circuit) -> Result<Model, sim::Error> {
+    model_going(config, way(config, &circuit.course))
+}
+
+fn model_going(config: &Config, way: Way) -> Result<Model, sim::Error> {
     let model = Model {
         machine: machine(config)?,
         run: RunRules {
-            way: way(config, &circuit.course),
+            way,
             control_step_s: config.controller.step_s,
             physics_steps: config.run.physics_steps as u32,
             start_offset_m: config.run.start_offset_m,

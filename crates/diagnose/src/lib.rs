@@ -18,9 +18,12 @@ pub use corners::{Corners, other_cuts};
 pub use detectable::Detectable;
 pub use error::Error;
 pub use laps::{
-    Atlas, Baselines, FourNumbers, LapDiagnosis, ObservedLap, Quadratic, Rival, Simulate, separations,
+    Atlas, Baselines, FourNumbers, LapDiagnosis, ObservedLap, Quadratic, Rival, Simulate, Unseen, separations,
 };
-pub use log::{Channel, Decided, LogDiagnosis, LogRow, diagnose_logs, log_separation};
+pub use log::{
+    Channel, Decided, Implausible, LogDiagnosis, LogRow, Why, diagnose_logs, log_separation,
+    take_out_implausible,
+};
 pub use mean_laps::{MeanLaps, mean_lap};
 pub use response_fit::{Estimate, ResponseFit};
 

@@ -1,12 +1,10 @@
 //! `lapwing trace`: what the model lacks.
 
-use std::collections::BTreeMap;
-
-use anyhow::{Result, ensure};
+use anyhow::{Result, bail};
 use serde_json::json;
 
 use crate::args;
-use crate::dataset::{DESCRIPTION, DataSet};
+use crate::dataset::{DataSet, RunFile};
 use crate::experiments::Section;
 use crate::output::{OutDir, Work};
 use crate::report::Report;
@@ -65,24 +63,28 @@ pub(crate) fn run(session: &Session, args: &args::Trace) -> Result<()> {
     if args.json {
         return session.print_json(&document);
     }
+    let remarks: String = (trace.remarks.iter())
+        .map(|remark| format!("of the data: {remark}\n"))
+        .collect();
     session.print(&format!(
-        "{text}\n\n{tables}report: {}\n",
+        "{text}\n{remarks}\n{tables}report: {}\n",
         args.out.join("report.html").display()
     ))
 }
 
-/// Whether every run is given once: twice it would count for two, and held out it would be no test.
+/// Whether every run is given once, however its file is packed: twice it would count for two, and held out it would be no test.
 fn each_once<'a>(sets: impl Iterator<Item = &'a DataSet>) -> Result<()> {
-    let mut known: BTreeMap<&str, &str> = BTreeMap::new();
-    let files = sets.flat_map(|set| &set.inputs);
-    for file in files.filter(|file| !file.path.ends_with(DESCRIPTION)) {
-        let other = known.insert(&file.sha256, &file.path);
-        ensure!(
-            other.is_none(),
-            "{}: the same run as {}; give each run once: what is held out must not be fitted, and what is given twice counts twice",
-            file.path,
-            other.unwrap_or_default()
-        );
+    let mut known: Vec<&RunFile> = Vec::new();
+    for run in sets.flat_map(|set| &set.runs) {
+        if let Some(other) = known.iter().find(|other| other.rows.is_seen_as(&run.rows)) {
+            bail!(
+                "{}: the same run as {}; give each run once: what is held out must not be fitted, and what is given twice counts \
+                 twice",
+                run.path.display(),
+                other.path.display()
+            );
+        }
+        known.push(run);
     }
     Ok(())
 }

@@ -19,6 +19,8 @@ pub(crate) struct CsvFile {
     text: Arc<[u8]>,
     reader: csv::Reader<Cursor<Arc<[u8]>>>,
     row: ByteRecord,
+    /// Bytes up to the row, and the lines that end in them.
+    counted: (usize, usize),
     /// For the manifest.
     pub(crate) input: Input,
 }
@@ -29,7 +31,8 @@ pub(crate) struct Row<'a> {
     label: &'a str,
     header: &'a [String],
     record: &'a ByteRecord,
-    text: &'a [u8],
+    /// Its line in the file.
+    pub(crate) line: usize,
 }
 
 impl CsvFile {
@@ -71,6 +74,7 @@ impl CsvFile {
             text,
             reader,
             row,
+            counted: (0, 0),
             input,
         })
     }
@@ -96,11 +100,12 @@ impl CsvFile {
         if !found.with_context(|| format!("cannot read {}", self.label))? {
             return Ok(None);
         }
+        self.count_lines();
         let row = Row {
             label: &self.label,
             header: &self.header,
             record: &self.row,
-            text: &self.text,
+            line: 1 + self.counted.1,
         };
         let (fields, columns) = (row.record.len(), row.header.len());
         if fields != columns {
@@ -108,6 +113,19 @@ impl CsvFile {
             return Err(row.error(format!("{fields} fields under a header of {columns}; {mend}")));
         }
         Ok(Some(row))
+    }
+
+    /// Counts the lines before the row. The reader's own count stands at the empty lines that it passes over before a row.
+    fn count_lines(&mut self) {
+        let byte = self.row.position().map_or(0, csv::Position::byte);
+        let start = usize::try_from(byte).unwrap_or(usize::MAX).min(self.text.len());
+        let empty = self.text[start..]
+            .iter()
+            .take_while(|byte| b"\r\n".contains(byte));
+        let end = start + empty.count();
+        let (bytes, lines) = self.counted;
+        let ends = self.text[bytes..end].iter().filter(|&&byte| byte == b'\n');
+        self.counted = (end, lines + ends.count());
     }
 
     /// The message with the file and the line of its header.
@@ -167,16 +185,7 @@ impl Row<'_> {
 
     /// The message with file and line.
     pub(crate) fn error(&self, message: impl std::fmt::Display) -> anyhow::Error {
-        anyhow!("{}:{}: {message}", self.label, self.line())
-    }
-
-    /// The reader's own count stands at the empty lines that it passes over before a row.
-    fn line(&self) -> usize {
-        let byte = self.record.position().map_or(0, csv::Position::byte);
-        let start = usize::try_from(byte).unwrap_or(usize::MAX);
-        let (before, after) = self.text.split_at(start.min(self.text.len()));
-        let empty = after.iter().take_while(|byte| b"\r\n".contains(byte));
-        1 + before.iter().chain(empty).filter(|&&byte| byte == b'\n').count()
+        anyhow!("{}:{}: {message}", self.label, self.line)
     }
 }
 

@@ -8,6 +8,7 @@ use toml::{Table, Value};
 use super::{DESCRIPTION, DataSet, LAPS, Source};
 use crate::config::{Config, ControllerKind, Document, nearest};
 use crate::output::Input;
+use crate::setup;
 
 /// Of a data set of laps.
 const KEYS: [&str; 8] = [
@@ -148,10 +149,17 @@ impl Description {
             Some(Value::Table(declared)) => declared,
             Some(_) => return Err(self.error("declared", "a table is needed, as [declared]")),
         };
-        match Config::shipped().overlaid(declared) {
-            Ok(_) => Ok(declared.clone()),
-            Err(fault) => Err(self.0.error(&format!("declared.{}", fault.key), fault)),
+        let at = |key: &str| format!("declared.{key}");
+        for (key, own) in [("world", "world"), ("controller.kind", "controller")] {
+            if self.0.line_of(&at(key)).is_some() {
+                let message = format!("[declared] {key}: `{own}` of the data set says that; remove it here");
+                return Err(self.0.error(&at(key), message));
+            }
         }
+        let config =
+            (Config::shipped().overlaid(declared)).map_err(|fault| self.0.error(&at(&fault.key), fault))?;
+        setup::check(&config).map_err(|error| self.0.error(&at(error.key().unwrap_or_default()), &error))?;
+        Ok(declared.clone())
     }
 
     fn runs(&self, source: Source<'_>) -> Result<Vec<(String, PathBuf)>> {

@@ -9,7 +9,7 @@ use super::{Log, Rows};
 use crate::output::Input;
 
 /// Columns of the log, in the order of [`Log`].
-pub(super) const LOG_COLUMNS: [&str; 10] = [
+pub(crate) const LOG_COLUMNS: [&str; 10] = [
     "ps0",
     "ps1",
     "ps2",
@@ -30,28 +30,35 @@ struct Columns {
     log: Option<[usize; 10]>,
 }
 
-/// A run's rows; columns that are not ours are passed over.
+/// A run's rows and their lines in the file; columns that are not ours are passed over.
 ///
 /// # Errors
 /// A required column is missing, a field is not a number, times do not rise, no rows.
-pub(super) fn run(path: &Path, bytes: &[u8]) -> Result<(Rows, Input)> {
+pub(super) fn run(path: &Path, bytes: &[u8]) -> Result<(Rows, Vec<usize>, Input)> {
     let mut file = CsvFile::new(path, bytes)?;
     let columns = Columns::find(&file)?;
     let mut rows = Rows {
         log: columns.log.map(|_| Log::default()),
         ..Rows::default()
     };
+    let mut lines = Vec::new();
     while let Some(row) = file.next_row()? {
+        lines.push(row.line);
         rows.push(&columns, row)?;
     }
     if rows.t_s.is_empty() {
         return Err(file.error("no rows under the header; a run needs one for each control step"));
     }
-    Ok((rows, file.input))
+    Ok((rows, lines, file.input))
 }
 
 impl Columns {
     fn find(file: &CsvFile) -> Result<Self> {
+        if file.header.iter().all(|name| name.parse::<f64>().is_ok()) {
+            return Err(
+                file.header_error("a row of numbers; a line with the names of the columns must come first")
+            );
+        }
         let column = |name: &str| {
             let known = file.header.join(", ");
             file.column(name)

@@ -5,10 +5,9 @@ use diagnose::{
     Answer, Atlas, Baselines, Detectable, Explanation, FourNumbers, LogDiagnosis, LogRow, ObservedLap,
     Simulate, Verdict, Watch, diagnose_logs,
 };
-use sim::{Vec2, WheelSpeeds};
 
+use super::logs::Logs;
 use super::recording::Recording;
-use crate::dataset::{DataSet, RunFile};
 use crate::setup::Setup;
 
 /// An answer from logs beside what the laps make of it.
@@ -19,25 +18,6 @@ pub(crate) struct FromLogs {
     pub(crate) after: Option<FourNumbers>,
     /// Whether the laps agree with the answer.
     pub(crate) confirmed: bool,
-}
-
-/// The rows of every run, where all runs have a log.
-fn log_rows(set: &DataSet) -> Option<Vec<Vec<LogRow>>> {
-    set.runs.iter().map(rows_of).collect()
-}
-
-fn rows_of(run: &RunFile) -> Option<Vec<LogRow>> {
-    let log = run.rows.log.as_ref()?;
-    let row = |(i, time_s): (usize, f64)| LogRow {
-        time_s,
-        observed: run.rows.position_m[i].map(|[x, y]| Vec2::new(x, y)),
-        readings: log.readings[i],
-        command: WheelSpeeds {
-            left_m_s: log.left_m_s[i],
-            right_m_s: log.right_m_s[i],
-        },
-    };
-    Some(run.rows.since_start_s().enumerate().map(row).collect())
 }
 
 /// The laps of a trace, and what simulates such.
@@ -73,15 +53,15 @@ impl TracedLaps<'_> {
     pub(super) fn named_by_logs(
         &self,
         recording: &Recording,
-        rows: &[Vec<LogRow>],
+        logs: &Logs,
         watch: &Watch<'_>,
     ) -> Result<Named> {
-        let runs: Vec<&[LogRow]> = rows.iter().map(Vec::as_slice).collect();
+        let runs: Vec<&[LogRow]> = logs.runs.iter().map(Vec::as_slice).collect();
         let Setup { model, scene, .. } = &recording.setup;
         let mut logs =
             diagnose_logs(model, scene, &runs, watch).with_context(|| recording.measured.set.name.clone())?;
         watch("whether the laps agree");
-        let logged = recording.first_run..recording.first_run + rows.len();
+        let logged = recording.first_run..recording.first_run + runs.len();
         logs.answer.spread_over(&logged, self.laps.len());
         let (before, after) = (self.atlas).confirm(self.simulate, self.laps, &logs.answer.settings())?;
         let found = FromLogs {
@@ -119,10 +99,4 @@ impl FromLogs {
 /// The sets of names among the explanations that the data do not tell apart, the answer's first.
 pub(crate) fn rivals(answer: &Answer) -> &[Explanation] {
     &answer.explanations[..answer.indistinguishable]
-}
-
-/// The first recording of which all runs have a log, and its logs.
-pub(super) fn with_logs(recordings: &[Recording]) -> Option<(usize, Vec<Vec<LogRow>>)> {
-    (recordings.iter().enumerate())
-        .find_map(|(place, recording)| log_rows(&recording.measured.set).map(|rows| (place, rows)))
 }

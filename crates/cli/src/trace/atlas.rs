@@ -70,7 +70,7 @@ pub(super) fn atlas(
 fn atlas_of(session: &Session, recording: &Recording, purpose: Purpose, cache: &Cache) -> Result<Atlas> {
     let Recording { config, world, .. } = recording;
     let shape = recording.shape();
-    let alike = recording.runs_are_alike();
+    let alike = recording.expects_the_same_of_runs();
     let mut key = format!(
         "{}\n{purpose:?}\n{}\n{world}\n{shape:?}\n{}",
         Atlas::RECIPE,

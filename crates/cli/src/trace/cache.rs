@@ -54,7 +54,11 @@ impl Cache {
         fs::create_dir_all(folder)
             .and_then(|()| fs::write(&partial, whole))
             .and_then(|()| fs::rename(&partial, &file))
-            .map_err(|_| folder)
+            .map_err(|_| {
+                // A full disk may have left a part of it.
+                let _ = fs::remove_file(&partial);
+                folder
+            })
     }
 }
 

@@ -1,11 +1,12 @@
 //! The laps that the error before and after is told by.
 
+use std::borrow::Cow;
 use std::ops::Range;
 
 use anyhow::Result;
 use diagnose::{Answer, MeanLaps};
 use rayon::prelude::*;
-use sim::{Setting, Streams};
+use sim::{Setting, Step, Streams};
 use track::Lap;
 
 use super::recording::{Recording, RunPlace};
@@ -36,22 +37,26 @@ pub(crate) struct Errors {
     pub(crate) floor_m: Vec<f64>,
 }
 
-/// The errors of every recording; without unseen data each run is left out of the fit in turn.
+/// The errors of every recording; without data that no fit has seen each run is left out in turn.
 pub(super) fn errors(
     recordings: &[Recording],
     answer: &Answer,
-    unseen: Option<(usize, Vec<SampledRun>)>,
+    held_out: Option<(usize, Vec<SampledRun>)>,
     seed: u64,
 ) -> Result<Vec<Errors>> {
     let mut all = Vec::new();
     for (place, recording) in recordings.iter().enumerate() {
-        if unseen.as_ref().is_some_and(|(at, _)| *at != place) {
+        if held_out.as_ref().is_some_and(|(at, _)| *at != place) {
             continue;
         }
         let longest = recording.shape().into_iter().fold(1, usize::max);
         let laps_of = |effects: &[Setting], runs: Range<usize>| {
-            let places = &recording.places(effects)[runs];
-            mean_laps(&recording.setup, effects, seed, longest, places)
+            let mut places = recording.places(effects)[runs].to_vec();
+            if held_out.is_some() {
+                // What is held out has holes of its own, or none.
+                places.iter_mut().for_each(|place| place.unseen = None);
+            }
+            mean_laps(&recording.setup, effects, seed, longest, &places)
         };
         let off_m = |laps: &MeanLaps, run: &SampledRun| laps.distance_m(&run.offsets_m());
         let all_runs = 0..recording.measured.runs.len();
@@ -62,41 +67,43 @@ pub(super) fn errors(
         } else {
             laps_of(&settings, all_runs)?
         };
-        let (held_out, before_m, after_m) = match &unseen {
-            Some((_, runs)) => (
-                runs.clone(),
-                runs.iter().map(|run| off_m(&before, run)).collect(),
-                runs.iter().map(|run| off_m(&after, run)).collect(),
-            ),
-            None => {
-                let runs = recording.measured.runs.clone();
-                let (mut before_m, mut after_m) = (Vec::new(), Vec::new());
-                for (at, run) in runs.iter().enumerate() {
-                    let without = &answer.left_out[recording.first_run + at];
-                    let distance_m = |effects| anyhow::Ok(off_m(&laps_of(effects, at..at + 1)?, run));
-                    let own_m = if recording.runs_are_alike() {
-                        off_m(&before, run)
-                    } else {
-                        distance_m(&[])?
-                    };
-                    before_m.push(own_m);
-                    after_m.push(if without.is_empty() {
-                        own_m
-                    } else {
-                        distance_m(without)?
-                    });
-                }
-                (runs, before_m, after_m)
-            }
+        let runs = match &held_out {
+            Some((_, runs)) => runs,
+            None => &recording.measured.runs,
         };
+        let (mut before_m, mut after_m, mut floor_m) = (Vec::new(), Vec::new(), Vec::new());
+        for (at, run) in runs.iter().enumerate() {
+            let [own_before, own_after] = match &held_out {
+                Some(_) => [Cow::Borrowed(&before), Cow::Borrowed(&after)],
+                None => {
+                    let alone = |effects| anyhow::Ok(Cow::Owned(laps_of(effects, at..at + 1)?));
+                    let own_before = if recording.expects_the_same_of_runs() {
+                        Cow::Borrowed(&before)
+                    } else {
+                        alone(&[])?
+                    };
+                    let without = &answer.left_out[recording.first_run + at];
+                    let own_after = if without.is_empty() {
+                        own_before.clone()
+                    } else {
+                        alone(without)?
+                    };
+                    [own_before, own_after]
+                }
+            };
+            let of_chance = if recording.has_holes() { &own_after } else { &after };
+            before_m.push(off_m(&own_before, run));
+            after_m.push(off_m(&own_after, run));
+            floor_m.push(of_chance.floor_m(run.laps.len()));
+        }
         all.push(Errors {
             recording: place,
-            before_m,
-            floor_m: held_out.iter().map(|run| after.floor_m(run.laps.len())).collect(),
-            held_out,
+            held_out: runs.clone(),
             before,
             after,
+            before_m,
             after_m,
+            floor_m,
         });
     }
     Ok(all)
@@ -111,7 +118,7 @@ fn mean_laps(
     effects: &[Setting],
     seed: u64,
     longest: usize,
-    places: &[RunPlace],
+    places: &[RunPlace<'_>],
 ) -> Result<MeanLaps> {
     let changes = places.iter().any(|place| place.start.is_some());
     let (laps, runs) = if changes {
@@ -128,7 +135,14 @@ fn mean_laps(
         };
         let place = places[i as usize % places.len()];
         let world = setup.scene.world(&model, place.number)?;
-        Ok(sim::drive_from(&world, streams, place.start, laps, |_| {})?.laps)
+        let Some(unseen) = place.unseen else {
+            return Ok(sim::drive_from(&world, streams, place.start, laps, |_| {})?.laps);
+        };
+        let mut path = Vec::new();
+        let record = |step: &Step| path.push((step.time_s, step.observed));
+        let mut driven = sim::drive_from(&world, streams, place.start, laps, record)?.laps;
+        driven.retain(|lap| lap.missed.is_empty());
+        Ok(setup.seen_through(unseen, driven, &mut path))
     };
     let driven = (0..runs).into_par_iter().map(drive).collect::<Result<Vec<_>>>()?;
     Ok(MeanLaps::new(&driven)?)

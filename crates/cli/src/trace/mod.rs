@@ -6,6 +6,7 @@ mod cache;
 mod document;
 mod errors;
 mod limits;
+mod logs;
 mod next;
 mod pages;
 mod pictures;
@@ -19,13 +20,14 @@ use anyhow::Result;
 use diagnose::{Answer, Baselines, Decided, Detectable, FourNumbers};
 use sim::Setting;
 
-use answer::{FromLogs, TracedLaps, with_logs};
+use answer::{FromLogs, TracedLaps};
 use atlas::{Purpose, atlas, laps_simulated};
 pub(crate) use cache::Cache;
 pub(crate) use document::{document, parameters};
 pub(crate) use errors::Errors;
 use errors::errors;
 use limits::decide_in_words;
+use logs::{Logs, spoilt_in_words};
 use next::{Experiment, experiments};
 pub(crate) use pages::{digest, gates_csv, sections, summary};
 use recording::{Recording, Seeds, held_out, observed_laps, simulate_all};
@@ -91,7 +93,7 @@ impl Trace {
         let simulate =
             |effects: &[Setting], set: u64| simulate_all(&recordings, effects, Seeds { session: seed, set });
         let laps = observed_laps(&recordings)?;
-        let logged = with_logs(&recordings);
+        let logged = Logs::of(&recordings);
         let mut remarks = remarks(&recordings, logged.as_ref());
         // Logs name the effect, and the laps judge it.
         let purpose = if logged.is_some() {
@@ -107,8 +109,8 @@ impl Trace {
             simulate: &simulate,
             laps: &laps,
         };
-        let named = match logged {
-            Some((place, rows)) => traced.named_by_logs(&recordings[place], &rows, &watch),
+        let named = match &logged {
+            Some(logs) => traced.named_by_logs(&recordings[logs.recording], logs, &watch),
             None => traced.named(&watch),
         };
         interrupt::check()?;
@@ -117,10 +119,11 @@ impl Trace {
         progress.message("simulating the error before and after");
         let errors = errors(&recordings, &named.answer, unseen, seed)?;
         interrupt::check()?;
-        if let Some(found) = &named.from_logs
-            && matches!(found.logs.decide, Decided::NoController { .. })
-        {
-            remarks.push(decide_in_words(&found.logs.decide));
+        if let (Some(found), Some(logs)) = (&named.from_logs, &logged) {
+            remarks.extend(spoilt_in_words(&recordings[logs.recording], &found.logs));
+            if matches!(found.logs.decide, Decided::NoController { .. }) {
+                remarks.push(decide_in_words(&found.logs.decide));
+            }
         }
         let mut trace = Self {
             remarks,

@@ -169,7 +169,11 @@ fn by_laps(
     seed: u64,
 ) -> Option<Vec<(String, f64)>> {
     let simulate = |effects: &[Setting], set: u64| -> Option<Vec<Vec<ObservedLap>>> {
-        let anywhere = |number| RunPlace { number, start: None };
+        let anywhere = |number| RunPlace {
+            number,
+            start: None,
+            unseen: None,
+        };
         let runs = (0..RUNS).map(|run| (LAPS, anywhere(run)));
         Recording::drive(setup, effects, Seeds { session: seed, set }, runs)
     };

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use anyhow::{Context, Result, ensure};
-use diagnose::ObservedLap;
+use diagnose::{ObservedLap, Unseen};
 use sim::{Setting, Start, Step, Streams};
 use track::Lap;
 
@@ -22,6 +22,8 @@ pub(crate) struct Recording {
     pub(crate) measured: Measured,
     /// The same model with walls that another program may have cut.
     pub(super) cuts: Vec<Setup>,
+    /// Where in its laps the camera did not see the robot, run by run.
+    pub(super) unseen: Vec<Unseen>,
     /// Text of the world file.
     pub(super) world: String,
     /// Its first run's number among those of all recordings.
@@ -30,11 +32,13 @@ pub(crate) struct Recording {
 
 /// A run to be simulated.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct RunPlace {
+pub(crate) struct RunPlace<'a> {
     /// Its number among those of all recordings: effects that go by run have a value for each.
     pub(crate) number: usize,
     /// Where it starts, if not at random.
     pub(crate) start: Option<Start>,
+    /// Where in its laps the camera does not see it, if anywhere.
+    pub(crate) unseen: Option<&'a Unseen>,
 }
 
 /// Whether laps take about as long as the declared robot's: if not, by no effect that is worth a search, times are in another unit.
@@ -91,7 +95,8 @@ impl Recording {
             .iter()
             .flat_map(SampledRun::remarks)
             .for_each(|remark| session.remark(&remark));
-        let setup = Setup::new(&config, circuit, None)?;
+        let setup =
+            Setup::new(&config, circuit, None).map_err(|error| setup::locate(file, &source, error))?;
         in_seconds(&measured, &setup)?;
         let cuts = diagnose::other_cuts(&setup.scene, &setup.model)
             .into_iter()
@@ -100,11 +105,19 @@ impl Recording {
                 model: setup.model.clone(),
             })
             .collect();
+        let step_s = setup.model.run.control_step_s;
+        let unseen = (measured.runs.iter().enumerate())
+            .map(|(i, run)| {
+                let seen_s: Vec<f64> = measured.seen(i).map(|(time_s, _)| time_s).collect();
+                Unseen::of(&run.laps, &seen_s, step_s)
+            })
+            .collect();
         Ok(Self {
             config,
             setup,
             measured,
             cuts,
+            unseen,
             world: source.text,
             first_run,
         })
@@ -124,19 +137,30 @@ impl Recording {
         self.measured.runs.iter().enumerate().map(observed).collect()
     }
 
+    /// Whether the declared model leads one to expect the same laps of every run, wherever the run starts.
+    pub(super) fn expects_the_same_of_runs(&self) -> bool {
+        self.runs_are_alike() && !self.has_holes()
+    }
+
+    /// Whether the camera did not see the robot throughout its laps.
+    pub(super) fn has_holes(&self) -> bool {
+        !self.unseen.iter().all(Unseen::is_nothing)
+    }
+
     /// Whether the declared model does the same in every run, wherever the run starts.
-    pub(super) fn runs_are_alike(&self) -> bool {
+    fn runs_are_alike(&self) -> bool {
         self.setup.model.effects.iter().all(Setting::same_in_every_run)
     }
 
     /// The measured runs as places of runs simulated with these effects: they start where the measured ones did if what the
     /// robot does changes in the course of a run.
-    pub(super) fn places(&self, effects: &[Setting]) -> Vec<RunPlace> {
+    pub(super) fn places(&self, effects: &[Setting]) -> Vec<RunPlace<'_>> {
         let changes = (self.setup.model.effects.iter().chain(effects)).any(Setting::depends_on_time);
-        (self.measured.runs.iter().enumerate())
-            .map(|(i, run)| RunPlace {
+        (self.measured.runs.iter().zip(&self.unseen).enumerate())
+            .map(|(i, (run, unseen))| RunPlace {
                 number: self.first_run + i,
                 start: changes.then(|| run.start()),
+                unseen: Some(unseen).filter(|unseen| !unseen.is_nothing()),
             })
             .collect()
     }
@@ -158,7 +182,7 @@ impl Recording {
 
     fn simulate_at(
         &self,
-        places: Vec<RunPlace>,
+        places: Vec<RunPlace<'_>>,
         setup: &Setup,
         effects: &[Setting],
         seeds: Seeds,
@@ -167,18 +191,18 @@ impl Recording {
     }
 
     /// One simulated data set: so many laps of a run at each place.
-    pub(super) fn drive(
+    pub(super) fn drive<'a>(
         setup: &Setup,
         effects: &[Setting],
         seeds: Seeds,
-        runs: impl Iterator<Item = (usize, RunPlace)>,
+        runs: impl Iterator<Item = (usize, RunPlace<'a>)>,
     ) -> Option<Vec<Vec<ObservedLap>>> {
         if interrupt::check().is_err() {
             return None;
         }
         let mut model = setup.model.clone();
         model.effects.extend_from_slice(effects);
-        let run = |(run, (laps, place)): (usize, (usize, RunPlace))| {
+        let run = |(run, (laps, place)): (usize, (usize, RunPlace<'_>))| {
             let world = setup.scene.world(&model, place.number).ok()?;
             let streams = Streams {
                 seed: seeds.of_fit(),
@@ -190,7 +214,14 @@ impl Recording {
             let closed: Vec<Lap> = (drive.laps.into_iter())
                 .filter(|lap| lap.missed.is_empty())
                 .collect();
-            (closed.len() == laps).then(|| setup.observed(closed, &path))
+            if closed.len() != laps {
+                return None;
+            }
+            let closed = match place.unseen {
+                Some(unseen) => setup.seen_through(unseen, closed, &mut path),
+                None => closed,
+            };
+            Some(setup.observed(closed, &path))
         };
         runs.enumerate().map(run).collect()
     }
@@ -281,10 +312,14 @@ pub(super) fn observed_laps(recordings: &[Recording]) -> Result<Vec<Vec<Observed
     for (run, laps) in runs(recordings).zip(&laps) {
         ensure!(
             laps.len() >= 3,
-            "run {} has {} whole laps after its first: at least 3 in every run are needed to trace anything; leave the run \
-             out of `runs` in dataset.toml, or measure it again",
+            "run {} has {} whole laps after its first: at least 3 in every run are needed to trace anything; {}",
             run.name,
-            laps.len()
+            laps.len(),
+            if run.wanted < 3 {
+                "raise `laps` in dataset.toml"
+            } else {
+                "leave the run out of `runs` in dataset.toml, or measure it again"
+            }
         );
     }
     Ok(laps)

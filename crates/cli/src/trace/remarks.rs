@@ -2,10 +2,11 @@
 
 use diagnose::LogRow;
 
+use super::logs::Logs;
 use super::recording::{Recording, runs};
 
-/// What these data do not allow; `logged` are the logs that are used, with their recording.
-pub(super) fn remarks(recordings: &[Recording], logged: Option<&(usize, Vec<Vec<LogRow>>)>) -> Vec<String> {
+/// What these data do not allow; `logged` are the logs that are used.
+pub(super) fn remarks(recordings: &[Recording], logged: Option<&Logs>) -> Vec<String> {
     let mut remarks = Vec::new();
     if runs(recordings).count() == 1 {
         remarks.push(
@@ -14,7 +15,20 @@ pub(super) fn remarks(recordings: &[Recording], logged: Option<&(usize, Vec<Vec<
                 .to_owned(),
         );
     }
-    remarks.extend(runs(recordings).flat_map(|run| run.strays.clone()));
+    for recording in recordings {
+        let gates = recording.measured.circuit.gates.len();
+        for (run, unseen) in recording.measured.runs.iter().zip(&recording.unseen) {
+            remarks.extend(run.strays.iter().cloned().chain(run.laps_set_aside()));
+            if !unseen.is_nothing() {
+                remarks.push(format!(
+                    "Run {}: the camera did not see the robot on {:.1} % of its way; simulated laps are seen through the same \
+                     holes.",
+                    run.name,
+                    100.0 * unseen.share(gates)
+                ));
+            }
+        }
+    }
     for run in runs(recordings).filter(|run| run.laps.len() < run.wanted) {
         remarks.push(format!(
             "Run {} has {} of {} laps.",
@@ -23,8 +37,9 @@ pub(super) fn remarks(recordings: &[Recording], logged: Option<&(usize, Vec<Vec<
             run.wanted
         ));
     }
-    if let Some((place, logs)) = logged {
-        for (run, rows) in recordings[*place].measured.runs.iter().zip(logs) {
+    if let Some(logs) = logged {
+        remarks.extend(logs.implausible.iter().cloned());
+        for (run, rows) in recordings[logs.recording].measured.runs.iter().zip(&logs.runs) {
             if !rows.iter().any(LogRow::tells) {
                 remarks.push(format!(
                     "The log of run {} has no readings beside commands: a size that goes by run is the mean of the other \
@@ -34,7 +49,7 @@ pub(super) fn remarks(recordings: &[Recording], logged: Option<&(usize, Vec<Vec<
             }
         }
     }
-    let used = logged.map(|(place, _)| *place);
+    let used = logged.map(|logs| logs.recording);
     for (place, recording) in recordings.iter().enumerate() {
         let set = &recording.measured.set;
         let count = set.runs.iter().filter(|run| run.rows.log.is_some()).count();

@@ -6,6 +6,7 @@ mod layout;
 mod observed;
 mod summary;
 mod tests_of_fit;
+mod unseen;
 
 // The declared model, what is tried on it, and how likely that makes the data.
 mod atlas;
@@ -53,3 +54,4 @@ pub use observed::ObservedLap;
 pub use separation::{Rival, separations};
 pub(crate) use tests_of_fit::SIGNIFICANT_P;
 pub use tests_of_fit::{FourNumbers, Quadratic};
+pub use unseen::Unseen;

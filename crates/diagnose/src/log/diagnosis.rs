@@ -5,13 +5,13 @@ use std::collections::BTreeMap;
 use sim::{Model, Pattern, Scene, Setting, Stage, find};
 
 use super::channels::Channel;
-use super::decide::{Decided, decided};
+use super::decide::{Decided, decision};
 use super::evidence::{Evidence, widened};
 use super::filter::MEASURED;
 use super::groups::unlisted_variants;
 use super::recut::recut;
 use super::refined::Refined;
-use super::rows::LogRow;
+use super::rows::{LogRow, without_logs};
 use super::search::Search;
 use super::steps::{reading_step, written_step};
 use super::unnamed::Unnamed;
@@ -29,6 +29,9 @@ pub struct LogDiagnosis {
     pub decide: Decided,
     /// Probability that as much is found in the logs of a robot that is as declared.
     pub p: f64,
+    /// Of each run, the rows whose commands do not follow from their readings as those of nearly all others do: they were not
+    /// used.
+    pub spoilt: Vec<Vec<usize>>,
     /// Camera x and y, then S0 to S7, under the best explanation.
     pub channels: [Channel; MEASURED],
     /// Where the walls seem to be cut.
@@ -52,7 +55,12 @@ pub fn diagnose_logs(
     watch: &Watch<'_>,
 ) -> Result<LogDiagnosis, Error> {
     watch("the controller");
-    let decide = decided(model, runs);
+    let decision = decision(model, runs);
+    let (decide, spoilt) = (decision.decided, decision.spoilt);
+    let mended: Vec<Vec<LogRow>> = (runs.iter().zip(&spoilt))
+        .map(|(rows, spoilt)| without_logs(rows, spoilt))
+        .collect();
+    let runs: &[&[LogRow]] = &mended.iter().map(Vec::as_slice).collect::<Vec<_>>();
     let (wide, scene) = widened(model, scene)?;
     let step = reading_step(runs);
     let declared = Evidence::new(&scene, model, runs, step.unwrap_or_else(|| written_step(runs)))?;
@@ -68,7 +76,7 @@ pub fn diagnose_logs(
     let corners = |cut: &Option<(Corners, Scene)>| cut.as_ref().map_or(EXACT, |found| found.0);
     watch("each effect by the log");
     let Some(leads) = search.alone() else {
-        return Ok(search.answer(decide, corners(&first)));
+        return Ok(search.answer(decide, spoilt, corners(&first)));
     };
     // Where walls or the robot then are elsewhere, so are the readings that no edge spoils.
     let clear = search.evidence.clear_with_each(search.rivals());
@@ -98,17 +106,17 @@ pub fn diagnose_logs(
     watch(&format!("what is beside {}", search.best_in_words()));
     if was_clear && corners(&again) == corners(&first) {
         search.finish(&leads);
-        return Ok(search.answer(decide, corners(&first)));
+        return Ok(search.answer(decide, spoilt, corners(&first)));
     }
     let declared = declared.elsewhere(again.as_ref().map_or(&scene, |found| &found.1));
     let clear = declared.clear_with_each(search.rivals());
     let mut renewed = search.renewed(clear.unwrap_or(declared))?;
     renewed.finish(&leads);
-    Ok(renewed.answer(decide, corners(&again)))
+    Ok(renewed.answer(decide, spoilt, corners(&again)))
 }
 
 impl Search<'_> {
-    fn answer(self, decide: Decided, corners: Corners) -> LogDiagnosis {
+    fn answer(self, decide: Decided, spoilt: Vec<Vec<usize>>, corners: Corners) -> LogDiagnosis {
         let certain = self.certain(&decide);
         let is_certain = !certain.is_empty();
         let mut explanations: Vec<Explanation> = Vec::new();
@@ -168,6 +176,7 @@ impl Search<'_> {
         LogDiagnosis {
             answer,
             decide,
+            spoilt,
             p: if is_certain { 0.0 } else { self.p },
             channels: self.channels,
             corners,

@@ -6,8 +6,10 @@
 //! innovations; linear algebra ranks the effects, and the best are refined by the log-likelihood.
 
 // What is known exactly.
+mod controller;
 mod decide;
 mod evidence;
+mod implausible;
 mod rows;
 mod steps;
 
@@ -45,5 +47,6 @@ mod separation;
 pub use channels::Channel;
 pub use decide::Decided;
 pub use diagnosis::{LogDiagnosis, diagnose_logs};
+pub use implausible::{Implausible, Why, take_out_implausible};
 pub use rows::LogRow;
 pub use separation::log_separation;

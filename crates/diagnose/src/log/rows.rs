@@ -46,6 +46,19 @@ impl LogRow {
     }
 }
 
+/// The rows of a run, without readings and commands in some of them.
+pub(crate) fn without_logs(rows: &[LogRow], where_not: &[usize]) -> Vec<LogRow> {
+    let mut rows = rows.to_vec();
+    for &row in where_not {
+        rows[row].readings = [f64::NAN; 8];
+        rows[row].command = WheelSpeeds {
+            left_m_s: f64::NAN,
+            right_m_s: f64::NAN,
+        };
+    }
+    rows
+}
+
 /// Stretches of rows that follow each other without a gap and know their commands; the rest is left out.
 pub(crate) fn stretches<'a>(rows: &'a [LogRow], rules: &RunRules) -> Vec<&'a [LogRow]> {
     let mut found = Vec::new();

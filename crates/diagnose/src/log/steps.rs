@@ -1,6 +1,5 @@
 //! The multiples to which readings were rounded, by looking at the values that occur.
 
-use super::decide::written_counts;
 use super::rows::LogRow;
 
 /// Step up to which whole counts tell nothing but how they were written.
@@ -37,6 +36,19 @@ pub(crate) fn written_step(runs: &[&[LogRow]]) -> f64 {
     const TENTHS: f64 = 0.1;
     let finest = runs.iter().map(|rows| written_counts(rows)).fold(1.0, f64::min);
     finest.max(TENTHS)
+}
+
+/// The power of ten, at most 1, that all readings of a log are multiples of.
+pub(crate) fn written_counts(rows: &[LogRow]) -> f64 {
+    const DECIMALS: std::ops::RangeInclusive<i32> = 0..=6;
+    let all_are_multiples = |decimals: &i32| {
+        let scale = 10.0_f64.powi(*decimals);
+        let is_multiple = |reading: &f64| (scale * reading - (scale * reading).round()).abs() < 1e-4;
+        let mut readings = rows.iter().filter_map(LogRow::read);
+        readings.all(|readings| readings.iter().all(is_multiple))
+    };
+    let decimals = DECIMALS.clone().find(all_are_multiples);
+    10.0_f64.powi(-decimals.unwrap_or(*DECIMALS.end()))
 }
 
 /// Whether all readings lie within the file's rounding of multiples of something near the guess, which is known no better where

@@ -1,25 +1,34 @@
-//! Sightings of the robot where it cannot be.
+//! Where a camera saw the robot: sightings where it cannot be, and times in which it was not seen.
+
+use track::Lap;
 
 use crate::dataset::RunFile;
 
 /// Takes sightings away where no robot can have been between those beside them, and says which.
 pub(crate) fn without_strays(run: &mut RunFile) -> Vec<String> {
-    let path = run.path.display().to_string();
-    let rows = &mut run.rows;
-    let say = |row: usize| {
-        let [x, y] = rows.position_m[row].unwrap_or([f64::NAN; 2]);
-        let time_s = rows.t_s[row];
+    let strays = strays(&run.rows.t_s, &run.rows.position_m);
+    let say = |&row: &usize| {
+        let [x, y] = run.rows.position_m[row].unwrap_or([f64::NAN; 2]).map(short);
         format!(
-            "{path}: at t_s = {time_s:.3} the robot is seen at ({x}, {y}), where it cannot get from where it is seen \
-             before and after; taken as not seen"
+            "{}: the robot is seen at ({x}, {y}), where it cannot get from where it is seen before and after; taken as not \
+             seen",
+            run.place(row)
         )
     };
-    let strays = strays(&rows.t_s, &rows.position_m);
-    let words = strays.iter().map(|&row| say(row)).collect();
+    let words = strays.iter().map(say).collect();
     for row in strays {
-        rows.position_m[row] = None;
+        run.rows.position_m[row] = None;
     }
     words
+}
+
+/// A number as a reader knows it again, whatever its size.
+pub(crate) fn short(number: f64) -> String {
+    if number != 0.0 && !(1e-4..1e6).contains(&number.abs()) {
+        format!("{number:e}")
+    } else {
+        number.to_string()
+    }
 }
 
 /// A row in which the robot is seen.
@@ -80,6 +89,73 @@ fn strays(t_s: &[f64], position_m: &[Option<[f64; 2]>]) -> Vec<usize> {
         return Vec::new();
     }
     strays
+}
+
+/// A time in which the robot was not seen, since the run began.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Hole {
+    from_s: f64,
+    to_s: f64,
+    /// The last row in which it was seen.
+    row: usize,
+}
+
+/// The holes in a run that are too long for a straight line across them to stand for the way driven.
+pub(crate) fn long_holes(run: &RunFile, whole: &[Lap]) -> Vec<Hole> {
+    /// Of a lap's time.
+    const LONGEST: f64 = 0.05;
+    let mut durations_s: Vec<f64> = whole
+        .iter()
+        .map(Lap::duration_s)
+        .filter(|s| s.is_finite())
+        .collect();
+    if durations_s.is_empty() {
+        return Vec::new();
+    }
+    let middle = durations_s.len() / 2;
+    let longest_s = LONGEST * *durations_s.select_nth_unstable_by(middle, f64::total_cmp).1;
+    let times_s: Vec<f64> = run.rows.since_start_s().collect();
+    let seen: Vec<usize> = (0..times_s.len())
+        .filter(|&row| run.rows.position_m[row].is_some())
+        .collect();
+    let hole = |pair: &[usize]| Hole {
+        from_s: times_s[pair[0]],
+        to_s: times_s[pair[1]],
+        row: pair[0],
+    };
+    let holes = seen.windows(2).map(hole);
+    holes.filter(|hole| hole.to_s - hole.from_s > longest_s).collect()
+}
+
+/// Where one of a run's laps has a hole, if it has one, in words.
+pub(crate) fn lost_in_words(run: &RunFile, holes: &[Hole], whole: &[Lap], number: usize) -> Option<String> {
+    let [start_s, end_s] = bounds_s(whole, number);
+    let inside = |hole: &&Hole| hole.from_s < end_s && start_s < hole.to_s;
+    let hole = holes.iter().find(inside)?;
+    let (place, for_s) = (run.place(hole.row), hole.to_s - hole.from_s);
+    Some(format!(
+        "{place}: from here on the robot is not seen for {for_s:.1} s"
+    ))
+}
+
+/// From when to when a lap of a run went; where gate 0 was missed, at most.
+fn bounds_s(whole: &[Lap], number: usize) -> [f64; 2] {
+    let known = |lap: &Lap| {
+        lap.times_s
+            .clone()
+            .into_iter()
+            .filter(|time_s| time_s.is_finite())
+    };
+    let before = number
+        .checked_sub(1)
+        .and_then(|before| known(&whole[before]).reduce(f64::max));
+    let after = whole.get(number + 1).and_then(|lap| known(lap).reduce(f64::min));
+    let lap = &whole[number];
+    [
+        (lap.start_s, before.unwrap_or(f64::NEG_INFINITY)),
+        (lap.end_s, after.unwrap_or(f64::INFINITY)),
+    ]
+    .map(|(own_s, else_s)| if own_s.is_nan() { else_s } else { own_s })
 }
 
 #[cfg(test)]

@@ -1,0 +1,193 @@
+//! Values in a log that the robot cannot have written.
+
+use sim::Model;
+
+use super::rows::LogRow;
+
+/// A value that was taken out of a log.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Implausible {
+    /// Which row.
+    pub row: usize,
+    /// Which value of it: 0 to 7 are the readings of S0 to S7, 8 and 9 the commands to the left and the right wheel.
+    pub column: usize,
+    /// In counts, or m/s.
+    pub value: f64,
+    /// What is wrong with it.
+    pub why: Why,
+}
+
+/// Why a value is implausible.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Why {
+    /// No robot of the model writes it.
+    OutOfRange,
+    /// A reading far from those of the same sensor in the rows before and after, which are near each other.
+    Spike,
+}
+
+/// Takes single values out of a run's log that its robot cannot have written, or that something spoilt, and says which: readings
+/// outside the sensors' range and commands beyond the wheels' limit, and readings that leap away for one row. None of a sort if
+/// there are many of it: that is another unit, or another robot, and no fault of single values.
+pub fn take_out_implausible(rows: &mut [LogRow], model: &Model) -> Vec<Implausible> {
+    let mut found = taken_out(rows, out_of_range(rows, model));
+    for sensor in 0..8 {
+        found.extend(taken_out(rows, spikes(rows, sensor)));
+    }
+    found.sort_by_key(|found| (found.row, found.column));
+    found
+}
+
+/// Values are taken out if they are few.
+fn taken_out(rows: &mut [LogRow], found: Vec<Implausible>) -> Vec<Implausible> {
+    const FEW: usize = 3;
+    const FEW_OF_ALL: f64 = 1e-3;
+    if found.len() > FEW.max((FEW_OF_ALL * rows.len() as f64) as usize) {
+        return Vec::new();
+    }
+    for Implausible { row, column, .. } in &found {
+        *values(&mut rows[*row])[*column] = f64::NAN;
+    }
+    found
+}
+
+fn out_of_range(rows: &[LogRow], model: &Model) -> Vec<Implausible> {
+    let bounds = bounds(model);
+    let mut found = Vec::new();
+    for (row, logged) in rows.iter().enumerate() {
+        for (column, (value, [low, high])) in values(&mut logged.clone()).into_iter().zip(bounds).enumerate()
+        {
+            if *value < low || *value > high {
+                found.push(Implausible {
+                    row,
+                    column,
+                    value: *value,
+                    why: Why::OutOfRange,
+                });
+            }
+        }
+    }
+    found
+}
+
+/// Readings of one sensor that leap away for one row, much farther than others do by their noise.
+fn spikes(rows: &[LogRow], sensor: usize) -> Vec<Implausible> {
+    /// Share of the rows that tell how far the noise goes, and how many times as far a spike leaps.
+    const TAIL: f64 = 5e-3;
+    const TIMES: f64 = 6.0;
+    /// What is no spike in any case, counts.
+    const LEAST_COUNTS: f64 = 200.0;
+    let reading = |row: usize| rows[row].readings[sensor];
+    let leap = |row: usize| {
+        let (from, to) = (reading(row) - reading(row - 1), reading(row) - reading(row + 1));
+        // NaN where one of them is missing, which is no leap.
+        if from * to > 0.0 {
+            from.abs().min(to.abs())
+        } else {
+            0.0
+        }
+    };
+    let places = 1..rows.len().saturating_sub(1);
+    let mut leaps: Vec<f64> = places.clone().map(leap).collect();
+    if leaps.is_empty() {
+        return Vec::new();
+    }
+    let rank = (TAIL * leaps.len() as f64) as usize;
+    let usual = *leaps.select_nth_unstable_by(rank, |a, b| b.total_cmp(a)).1;
+    places
+        .filter(|&row| leap(row) > LEAST_COUNTS.max(TIMES * usual))
+        .map(|row| Implausible {
+            row,
+            column: sensor,
+            value: reading(row),
+            why: Why::Spike,
+        })
+        .collect()
+}
+
+/// From where to where the values of a row can be.
+fn bounds(model: &Model) -> [[f64; 2]; 10] {
+    /// Readings that are rounded, by the robot or by the file, may lie a little outside their range, counts and share.
+    const BELOW_COUNTS: f64 = 0.1;
+    const BEYOND: f64 = 1.25;
+    const SPEED_ROUNDING_M_S: f64 = 2e-5;
+    let machine = &model.machine;
+    let limit_m_s = machine.robot.wheel_speed_limit_m_s + SPEED_ROUNDING_M_S;
+    std::array::from_fn(|column| match column {
+        0..8 => [-BELOW_COUNTS, BEYOND * machine.full_scale_counts],
+        _ => [-limit_m_s, limit_m_s],
+    })
+}
+
+fn values(row: &mut LogRow) -> [&mut f64; 10] {
+    let [a, b, c, d, e, f, g, h] = &mut row.readings;
+    let command = &mut row.command;
+    [
+        a,
+        b,
+        c,
+        d,
+        e,
+        f,
+        g,
+        h,
+        &mut command.left_m_s,
+        &mut command.right_m_s,
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use sim::WheelSpeeds;
+
+    use super::*;
+
+    /// Rows of a robot whose sensors see walls come and go, with noise of so many counts.
+    fn rows(noise_counts: f64) -> Vec<LogRow> {
+        let mut noise = sim::Streams { seed: 3, run: 0 }.open("noise");
+        let row = |i: usize| {
+            let time_s = 0.064 * i as f64;
+            // A wall that comes into sight at once, as one beyond an edge does.
+            let seen = if (i / 100).is_multiple_of(2) { 900.0 } else { 0.0 };
+            LogRow {
+                time_s,
+                observed: None,
+                readings: std::array::from_fn(|_| (seen + noise_counts * noise.normal()).max(0.0)),
+                command: WheelSpeeds {
+                    left_m_s: 0.05,
+                    right_m_s: 0.05,
+                },
+            }
+        };
+        (0..4000).map(row).collect()
+    }
+
+    #[test]
+    fn readings_that_leap_away_for_one_row_are_spikes_and_edges_and_noise_are_none() {
+        for noise_counts in [0.0, 10.0, 150.0] {
+            let mut log = rows(noise_counts);
+            assert_eq!((0..8).map(|sensor| spikes(&log, sensor).len()).sum::<usize>(), 0);
+            log[1234].readings[4] = 3900.0;
+            let found = spikes(&log, 4);
+            let found = taken_out(&mut log, found);
+            let expected = Implausible {
+                row: 1234,
+                column: 4,
+                value: 3900.0,
+                why: Why::Spike,
+            };
+            assert_eq!(found, [expected]);
+            assert!(log[1234].readings[4].is_nan() && log[1234].read().is_none());
+        }
+    }
+
+    #[test]
+    fn many_are_no_fault_of_single_values() {
+        let mut log = rows(10.0);
+        (0..10).for_each(|i| log[50 + 400 * i].readings[4] += 2500.0);
+        let before = log.clone();
+        let found = spikes(&log, 4);
+        assert_eq!((found.len(), taken_out(&mut log, found)), (10, Vec::new()));
+        assert_eq!(log, before);
+    }
+}
