@@ -41,6 +41,7 @@ mod diagnosis;
 mod rounds;
 mod search;
 mod singles;
+mod verdict;
 
 // What is said beside the answer.
 mod baseline;

@@ -7,7 +7,6 @@ use std::ops::Range;
 use std::sync::OnceLock;
 
 use super::atlas::{Atlas, White};
-use super::diagnosis::is_noise;
 use super::hypothesis::Hypothesis;
 use super::intervals::Interval;
 use super::observed::ObservedLap;
@@ -19,6 +18,7 @@ use super::rounds::{ROUNDS, ROUNDS_FROM_NEAR, ROUNDS_OF_GROUPS, ROUNDS_OF_SEVERA
 use super::scans::Scan;
 use super::tests_of_fit::{FourNumbers, Quadratic, SIGNIFICANT_P};
 use super::trial::Trial;
+use super::verdict::is_noise;
 use crate::{Candidate, Explanation, Watch};
 
 /// An explanation and what simulates it.

@@ -39,6 +39,7 @@ mod wheels;
 mod diagnosis;
 mod repeat;
 mod search;
+mod second;
 
 // What is said beside the answer.
 mod detectable;
