@@ -186,6 +186,7 @@ fn size(effect: &Candidate) -> String {
                     (high < param.high).then_some(high),
                 ],
             ),
+            None if effect.interval(place) == [param.low, param.high] => with_interval(value, [None; 2]),
             None if error > 0.0 => with_error(value, error),
             None => four_digits(value),
         }
