@@ -345,6 +345,39 @@ fn times_in_milliseconds_are_refused() {
 }
 
 #[test]
+fn rows_between_control_steps_are_refused() {
+    let scratch = Scratch::new();
+    few_laps(&[4]).record(&scratch, "set");
+    with_columns(&scratch, "set/run_a.csv", 0..1, |time_s| {
+        format!("{:.3}", 0.5 * time_s)
+    });
+    let ran = try_trace(&scratch, "braitenberg", "set", &[]);
+    let said = "set/run_a.csv: a row every 0.032 s, and the declared robot's control step is 0.064 s";
+    assert!(
+        ran.status == Some(2) && ran.stderr.contains(said),
+        "{}",
+        ran.stderr
+    );
+}
+
+#[test]
+fn a_camera_that_sees_every_other_control_step_is_enough() {
+    let scratch = Scratch::new();
+    limping().logged(&[4; 3]).record(&scratch, "set");
+    for run in ["a", "b", "c"] {
+        rewrite(&scratch, &format!("set/run_{run}.csv"), |row, mut fields| {
+            if row % 2 == 1 {
+                fields[1..3].iter_mut().for_each(String::clear);
+            }
+            Some(fields)
+        });
+    }
+    let found = trace(&scratch, "braitenberg", "set", &[]);
+    says(&found, "explained", &["wheel-asymmetry"]);
+    holds(&found["effects"][0], "ratio", LIMPING, 1.0);
+}
+
+#[test]
 fn a_run_that_is_given_twice_is_refused() {
     let scratch = Scratch::new();
     few_laps(&[3; 2]).record(&scratch, "set");

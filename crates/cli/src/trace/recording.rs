@@ -8,7 +8,7 @@ use sim::{Setting, Start, Step, Streams};
 use track::Lap;
 
 use crate::config::{Config, ModelFile};
-use crate::dataset::DataSet;
+use crate::dataset::{DataSet, RunFile};
 use crate::interrupt;
 use crate::laps::{Measured, SampledRun};
 use crate::session::Session;
@@ -59,6 +59,29 @@ fn in_seconds(measured: &Measured, setup: &Setup) -> Result<()> {
     Ok(())
 }
 
+/// Whether a run has a row for each control step of the declared robot: of laps some may be missing, but none be between.
+fn in_control_steps(run: &RunFile, step_s: f64) -> Result<()> {
+    /// Share by which a step may be off.
+    const OFF: f64 = 0.25;
+    let mut apart_s: Vec<f64> = run.rows.t_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    if apart_s.is_empty() {
+        return Ok(());
+    }
+    let middle = apart_s.len() / 2;
+    let usual_s = *apart_s.select_nth_unstable_by(middle, f64::total_cmp).1;
+    let longest_s = match run.rows.log {
+        Some(_) => step_s * (1.0 + OFF),
+        None => f64::INFINITY,
+    };
+    ensure!(
+        (step_s * (1.0 - OFF)..=longest_s).contains(&usual_s),
+        "{}: a row every {usual_s:.3} s, and the declared robot's control step is {step_s} s: give a row for each control step, or \
+         say how long it is (controller.step_s, in [declared] of dataset.toml)",
+        run.path.display()
+    );
+    Ok(())
+}
+
 impl Recording {
     /// Data sets, checked against the model.
     ///
@@ -98,6 +121,10 @@ impl Recording {
         let setup =
             Setup::new(&config, circuit, None).map_err(|error| setup::locate(file, &source, error))?;
         in_seconds(&measured, &setup)?;
+        let step_s = setup.model.run.control_step_s;
+        for run in &measured.set.runs {
+            in_control_steps(run, step_s)?;
+        }
         let cuts = diagnose::other_cuts(&setup.scene, &setup.model)
             .into_iter()
             .map(|scene| Setup {
@@ -105,7 +132,6 @@ impl Recording {
                 model: setup.model.clone(),
             })
             .collect();
-        let step_s = setup.model.run.control_step_s;
         let unseen = (measured.runs.iter().enumerate())
             .map(|(i, run)| {
                 let seen_s: Vec<f64> = measured.seen(i).map(|(time_s, _)| time_s).collect();
