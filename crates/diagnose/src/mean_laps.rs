@@ -20,23 +20,21 @@ impl MeanLaps {
     /// # Errors
     /// [`Error::NoLaps`] where fewer than two runs count: what chance does cannot be told.
     pub fn new(runs: &[Vec<Lap>]) -> Result<Self, Error> {
-        let whole = |laps: &Vec<Lap>| -> Vec<Vec<f64>> {
-            let whole = laps.iter().filter(|lap| lap.missed.is_empty());
-            whole.map(|lap| lap.offsets_m.clone()).collect()
-        };
-        let runs_m: Vec<Vec<Vec<f64>>> = runs.iter().map(whole).filter(|laps| !laps.is_empty()).collect();
-        let (completing, runs_driven) = (runs_m.len(), runs.len());
-        let mean_m = mean_lap(runs_m.iter().flatten()).filter(|_| completing > 1);
+        let whole: Vec<Vec<&Lap>> = (runs.iter())
+            .map(|laps| laps.iter().filter(|lap| lap.missed.is_empty()).collect())
+            .filter(|laps: &Vec<&Lap>| !laps.is_empty())
+            .collect();
+        let mean_m = mean_lap(whole.iter().flatten().map(|lap| &lap.offsets_m)).filter(|_| whole.len() > 1);
         let mean_m = mean_m.ok_or(Error::NoLaps {
-            completing,
-            runs: runs_driven,
+            completing: whole.len(),
+            runs: runs.len(),
         })?;
-        let whole = runs.iter().flatten().filter(|lap| lap.missed.is_empty());
-        let times_s: Vec<f64> = whole.map(Lap::duration_s).collect();
+        let times_s: Vec<f64> = whole.iter().flatten().map(|lap| lap.duration_s()).collect();
+        let offsets_m = |laps: &Vec<&Lap>| laps.iter().map(|lap| lap.offsets_m.clone()).collect();
         Ok(Self {
             mean_m,
             lap_s: times_s.iter().sum::<f64>() / times_s.len() as f64,
-            runs_m,
+            runs_m: whole.iter().map(offsets_m).collect(),
         })
     }
 

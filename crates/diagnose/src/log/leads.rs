@@ -91,18 +91,8 @@ fn patterns(variant: &Variant) -> bool {
     }
 }
 
-fn sums(normals: impl Iterator<Item = Normal>) -> Option<Normal> {
-    normals.reduce(|a, b| Normal {
-        right: a.right + b.right,
-        left: a.left + b.left,
-        right_time: a.right_time + b.right_time,
-        cross_time: a.cross_time + b.cross_time,
-        left_time: a.left_time + b.left_time,
-    })
-}
-
 pub(crate) fn constant(variant: usize, normals: &[Normal]) -> Lead {
-    let sum = sums(normals.iter().cloned());
+    let sum = Normal::sum(normals.iter().cloned());
     let information = (sum.as_ref()).map_or(DVector::zeros(0), |sum| sum.left.diagonal());
     let solution = sum.map(|sum| solve(&sum.left, &sum.right));
     let (multiples, gain) = solution.map_or((DVector::zeros(0), 0.0), |s| (s.multiples, s.gain));
@@ -117,7 +107,7 @@ pub(crate) fn constant(variant: usize, normals: &[Normal]) -> Lead {
 }
 
 fn by_time(variant: usize, normals: &[Normal]) -> Lead {
-    let Some(sum) = sums(normals.iter().cloned()) else {
+    let Some(sum) = Normal::sum(normals.iter().cloned()) else {
         return constant(variant, normals);
     };
     let k = sum.right.len();
@@ -145,7 +135,7 @@ pub(crate) fn by_run(evidence: &Evidence<'_>, variant: usize, normals: &[Normal]
             .iter()
             .zip(normals)
             .filter(move |(s, _)| s.run == run);
-        sums(mine.map(|(_, n)| n.clone())).map(|sum| solve(&sum.left, &sum.right))
+        Normal::sum(mine.map(|(_, n)| n.clone())).map(|sum| solve(&sum.left, &sum.right))
     };
     let solutions: Vec<_> = runs.iter().filter_map(|&run| of(run)).collect();
     Lead {

@@ -84,11 +84,6 @@ fn gram(
             Ok(normal_of(trace, &columns.concat()))
         })
         .collect::<Result<_, Error>>()?;
-    let zero = normal_of(&Trace::default(), &vec![Vec::new(); count]);
-    let total = normals.into_iter().fold(zero, |a, b| Normal {
-        right: a.right + b.right,
-        left: a.left + b.left,
-        ..a
-    });
-    Ok((total, ranges))
+    let nothing = || normal_of(&Trace::default(), &vec![Vec::new(); count]);
+    Ok((Normal::sum(normals.into_iter()).unwrap_or_else(nothing), ranges))
 }

@@ -20,6 +20,19 @@ pub(crate) struct Normal {
     pub(crate) left_time: DMatrix<f64>,
 }
 
+impl Normal {
+    /// The equations of several runs together; `None` of none.
+    pub(crate) fn sum(normals: impl Iterator<Item = Self>) -> Option<Self> {
+        normals.reduce(|a, b| Self {
+            right: a.right + b.right,
+            left: a.left + b.left,
+            right_time: a.right_time + b.right_time,
+            cross_time: a.cross_time + b.cross_time,
+            left_time: a.left_time + b.left_time,
+        })
+    }
+}
+
 /// Variants whose columns are taken in one pass over a trace.
 pub(crate) const TOGETHER: usize = 8;
 
