@@ -560,7 +560,7 @@ fn laps_that_skip_a_gate_are_set_aside_and_named() {
     scratch.refuses(
         &["compare", "set", "--out", "o"],
         "set/run_a.csv:1500: from here on the robot is not seen for 14.3 s: lap 1 misses gate 16 and is set aside, and none \
-         is left; measure the run again",
+         is left: measure the run again, or take it out of `runs` in dataset.toml",
     );
 }
 

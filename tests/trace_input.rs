@@ -214,6 +214,133 @@ fn values_that_no_robot_writes_are_taken_as_missing_and_said() {
     assert_eq!(remarks(&found), expected);
 }
 
+/// A log as a robot with a bad radio, a cheap clock and a camera that has bad moments leaves it.
+fn damage(scratch: &Scratch, folder: &str) {
+    // Times that jitter by up to 9 ms.
+    rewrite(scratch, &format!("{folder}/run_a.csv"), |row, mut fields| {
+        let time_s: f64 = fields[0].parse().unwrap();
+        let jitter_s = 1e-3 * ((row * 7919) % 19) as f64 - 9e-3;
+        fields[0] = format!("{:.3}", 1.0 + time_s + jitter_s);
+        Some(fields)
+    });
+    // One row in 75 is missing.
+    rewrite(scratch, &format!("{folder}/run_b.csv"), |row, fields| {
+        (row % 75 != 74).then_some(fields)
+    });
+    // Columns 1 and 2 are the position, 3 to 10 the readings, 11 and 12 the commands.
+    let mut frozen = Vec::new();
+    let mut frozen_at = |row: usize, fields: &mut [String]| match row {
+        2000 => frozen = fields[1..3].to_vec(),
+        2001..2020 => fields[1..3].clone_from_slice(&frozen),
+        _ => {}
+    };
+    let text = scratch.read(&format!("{folder}/run_c.csv"));
+    let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
+    for (row, line) in lines.iter_mut().skip(1).enumerate() {
+        let mut fields: Vec<String> = line.split(',').map(str::to_owned).collect();
+        frozen_at(row, &mut fields);
+        match row {
+            1000..=1002 => fields[6] = "4095".to_owned(),
+            _ if row % 400 == 399 => fields[11] = "0.01234".to_owned(),
+            _ if row % 1000 == 500 => {
+                fields[1] = format!("{:.4}", fields[1].parse::<f64>().unwrap() + 0.03);
+            }
+            _ => {}
+        }
+        *line = fields.join(",");
+    }
+    scratch.write(&format!("{folder}/run_c.csv"), lines.join("\n") + "\n");
+}
+
+#[test]
+fn a_bad_radio_clock_and_camera_are_no_effects() {
+    let scratch = Scratch::new();
+    for (folder, robot) in [("faithful", as_declared()), ("limping", limping())] {
+        robot.logged(&[5; 3]).record(&scratch, folder);
+        damage(&scratch, folder);
+    }
+    let found = trace(&scratch, "braitenberg", "faithful", &[]);
+    says(&found, "faithful", &[]);
+    for said in [
+        "run_c.csv:1002: ps3 is 4095, far from what it is in the rows before and after; taken as missing",
+        "run_c.csv:401: the command does not follow from the readings as those of the other rows do; taken as missing, as ",
+        "run_c.csv:2003: the camera sees the robot where it saw it in the row before, to the last digit; taken as not seen, as \
+         18 more of this run",
+        "run_c.csv:502: the robot is seen at ",
+    ] {
+        let said = format!("faithful/{said}");
+        assert!(
+            remarks(&found).iter().any(|remark| remark.starts_with(&said)),
+            "{said}: {:#}",
+            found["remarks"]
+        );
+    }
+    let found = trace(&scratch, "braitenberg", "limping", &[]);
+    says(&found, "explained", &["wheel-asymmetry"]);
+    holds(&found["effects"][0], "ratio", LIMPING, 1.0);
+}
+
+#[test]
+fn positions_in_millimetres_are_no_noise_of_the_robot() {
+    let scratch = Scratch::new();
+    as_declared().logged(&[5; 3]).record(&scratch, "set");
+    for run in ["a", "b", "c"] {
+        with_columns(&scratch, &format!("set/run_{run}.csv"), 1..3, |x_m| {
+            format!("{x_m:.3}")
+        });
+    }
+    let found = trace(&scratch, "braitenberg", "set", &[]);
+    says(&found, "faithful", &[]);
+    assert_eq!(
+        remarks(&found),
+        ["set: positions are written to 1 mm: the simulated camera is as much noisier."]
+    );
+}
+
+#[test]
+fn what_is_held_out_is_seen_through_its_own_holes() {
+    let scratch = Scratch::new();
+    let robot = as_declared().logged(&[8; 3]);
+    robot.record(&scratch, "all");
+    let description = scratch.read("all/dataset.toml");
+    for (set, runs) in [("set", ["a", "b"].as_slice()), ("held_out", &["c"])] {
+        let description = description.replace("[\"a\", \"b\", \"c\"]", &format!("{runs:?}"));
+        scratch.write(&format!("{set}/dataset.toml"), description);
+        for run in runs {
+            let run = format!("run_{run}.csv");
+            scratch.write(&format!("{set}/{run}"), scratch.read(&format!("all/{run}")));
+        }
+    }
+    rewrite(&scratch, "held_out/run_c.csv", |row, mut fields| {
+        if row % 150 < 40 && row > 40 {
+            fields[1..3].iter_mut().for_each(String::clear);
+        }
+        Some(fields)
+    });
+    let found = trace(&scratch, "braitenberg", "set", &["--held-out", "held_out"]);
+    says(&found, "faithful", &[]);
+    let error = |key: &str| found["error"][key].as_f64().unwrap();
+    // Without the holes it would be more than twice as far.
+    assert!(error("before") < 1.6 * error("floor"), "{}", found["error"]);
+}
+
+#[test]
+fn a_delay_of_a_control_step_is_sized_by_the_robots_own_steps() {
+    const DELAY_S: f64 = 0.064;
+    let scratch = Scratch::new();
+    let late = Setting::constant(sim::find("command-delay").unwrap(), [DELAY_S]);
+    let robot = Robot {
+        controller: ground::rule_based(),
+        ..Robot::with(late)
+    };
+    robot.logged(&[4; 3]).record(&scratch, "set");
+    let found = trace(&scratch, "rule-based", "set", &[]);
+    says(&found, "explained", &["command-delay"]);
+    let size = &found["effects"][0]["parameters"][0];
+    assert!((size["value"].as_f64().unwrap() - DELAY_S).abs() < 1e-9, "{size}");
+    assert!(size["low"].as_f64().unwrap() < DELAY_S - 0.015, "{size}");
+}
+
 #[test]
 fn the_time_of_day_on_a_robots_clock_is_no_time_since_its_start() {
     let (start, per_s) = (0.9, 2e-4);
@@ -387,10 +514,10 @@ fn a_run_that_is_given_twice_is_refused() {
         let said = "set/run_a.csv: the same run as set/run_a.csv; give each run once";
         assert!(ran.stderr.contains(said), "{}", ran.stderr);
     }
-    // Packed, or written otherwise, it is the same run.
+    // Written otherwise, and by another clock, it is the same run.
     few_laps(&[3; 2]).record(&scratch, "again");
     rewrite(&scratch, "again/run_a.csv", |_, mut fields| {
-        fields[0] += "0";
+        fields[0] = format!("{:.4}", fields[0].parse::<f64>().unwrap() + 100.0);
         Some(fields)
     });
     let ran = try_trace(&scratch, "braitenberg", "set", &["--held-out", "again"]);

@@ -64,6 +64,20 @@ impl RunFile {
     pub(crate) fn place(&self, row: usize) -> String {
         format!("{}:{}", self.path.display(), self.lines[row])
     }
+
+    /// What is said of rows that share a fault, and what becomes of them: of each by itself, or of the first if they are many.
+    pub(crate) fn tell(&self, rows: &[usize], what: impl Fn(usize) -> String, becomes: &str) -> Vec<String> {
+        const FEW: usize = 3;
+        let one = |&row: &usize| format!("{}: {}; {becomes}", self.place(row), what(row));
+        if rows.len() <= FEW {
+            return rows.iter().map(one).collect();
+        }
+        vec![format!(
+            "{}, as {} more of this run",
+            one(&rows[0]),
+            rows.len() - 1
+        )]
+    }
 }
 
 /// A run, one row per control step: T rows in all.
@@ -95,9 +109,9 @@ impl Rows {
         self.t_s.iter().map(move |t_s| t_s - first)
     }
 
-    /// Whether a camera saw the same of two runs.
-    pub(crate) fn is_seen_as(&self, other: &Self) -> bool {
-        self.t_s == other.t_s && self.position_m == other.position_m
+    /// Whether a camera saw the same of two runs, as far as the shorter one goes and whatever their clocks say.
+    pub(crate) fn begins_as(&self, other: &Self) -> bool {
+        self.position_m.iter().zip(&other.position_m).all(|(a, b)| a == b)
     }
 }
 

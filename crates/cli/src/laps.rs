@@ -205,7 +205,7 @@ fn sample(set: &DataSet, run: &RunFile, circuit: &Circuit, way: Way) -> Result<S
             bail!("{path}: x_m and y_m are empty in every row: the camera did not see the robot at all");
         }
         if let Some(lap) = sampled.out_of_sight.first() {
-            bail!("{lap}, and none is left; measure the run again");
+            bail!("{lap}, and none is left: measure the run again, or take it out of `runs` in dataset.toml");
         }
         if let Some((lap, gate)) = sampled.set_aside.first() {
             bail!(

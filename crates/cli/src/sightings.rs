@@ -2,25 +2,93 @@
 
 use track::Lap;
 
-use crate::dataset::RunFile;
+use crate::dataset::{Rows, RunFile};
 
-/// Takes sightings away where no robot can have been between those beside them, and says which.
+/// Takes sightings away that a camera repeats, or in which the robot is where it cannot be between those beside them, and says
+/// which.
 pub(crate) fn without_strays(run: &mut RunFile) -> Vec<String> {
-    let strays = strays(&run.rows.t_s, &run.rows.position_m);
-    let say = |&row: &usize| {
-        let [x, y] = run.rows.position_m[row].unwrap_or([f64::NAN; 2]).map(short);
-        format!(
-            "{}: the robot is seen at ({x}, {y}), where it cannot get from where it is seen before and after; taken as not \
-             seen",
-            run.place(row)
-        )
+    let repeated = |_: [String; 2]| {
+        "the camera sees the robot where it saw it in the row before, to the last digit".to_owned()
     };
-    let words = strays.iter().map(say).collect();
-    for row in strays {
+    let stray = |[x, y]: [String; 2]| {
+        format!("the robot is seen at ({x}, {y}), where it cannot get from where it is seen before and after")
+    };
+    let mut words = taken_away(run, |rows| repeats(&rows.position_m), repeated);
+    words.extend(taken_away(run, |rows| strays(&rows.t_s, &rows.position_m), stray));
+    words.extend(taken_away(run, |rows| outliers(&rows.position_m), stray));
+    words
+}
+
+/// Takes away the sightings of some rows, and says why.
+fn taken_away(
+    run: &mut RunFile,
+    which: impl Fn(&Rows) -> Vec<usize>,
+    why: impl Fn([String; 2]) -> String,
+) -> Vec<String> {
+    let rows = which(&run.rows);
+    let what = |row: usize| why(run.rows.position_m[row].unwrap_or([f64::NAN; 2]).map(short));
+    let words = run.tell(&rows, what, "taken as not seen");
+    for row in rows {
         run.rows.position_m[row] = None;
     }
     words
 }
+
+/// The rows in which a camera that has stopped gives its last sighting again and again.
+fn repeats(position_m: &[Option<[f64; 2]>]) -> Vec<usize> {
+    /// Sightings that are the same by chance, or as they are rounded, at most.
+    const LEAST: usize = 8;
+    let seen: Vec<usize> = (0..position_m.len())
+        .filter(|&row| position_m[row].is_some())
+        .collect();
+    let same = seen.chunk_by(|&a, &b| position_m[a] == position_m[b]);
+    same.filter(|rows| rows.len() >= LEAST)
+        .flat_map(|rows| rows[1..].to_vec())
+        .collect()
+}
+
+/// The rows in which a robot is seen far from the median of where it is seen about then; none if they are many.
+fn outliers(position_m: &[Option<[f64; 2]>]) -> Vec<usize> {
+    /// Sightings to either side of which the median is taken.
+    const REACH: usize = 4;
+    /// Share of the sightings that tell how far they are off as a rule, and how many times as far is far.
+    const TAIL: f64 = 0.02;
+    const TIMES: f64 = 6.0;
+    /// What is not far in any case, m.
+    const LEAST_M: f64 = 0.008;
+    let seen: Vec<(usize, [f64; 2])> = (position_m.iter().enumerate())
+        .filter_map(|(row, position)| position.map(|position| (row, position)))
+        .collect();
+    let off_m = |at: usize| {
+        // As many on one side as on the other: the robot moves.
+        let reach = REACH.min(at).min(seen.len() - 1 - at);
+        let middle = |axis: usize| {
+            let mut about: Vec<f64> = seen[at - reach..=at + reach]
+                .iter()
+                .map(|(_, p)| p[axis])
+                .collect();
+            *about.select_nth_unstable_by(reach, f64::total_cmp).1
+        };
+        (seen[at].1[0] - middle(0)).hypot(seen[at].1[1] - middle(1))
+    };
+    let all_m: Vec<f64> = (0..seen.len()).map(off_m).collect();
+    if all_m.is_empty() {
+        return Vec::new();
+    }
+    let mut sorted = all_m.clone();
+    let rank = (TAIL * sorted.len() as f64) as usize;
+    let usual_m = *sorted.select_nth_unstable_by(rank, |a, b| b.total_cmp(a)).1;
+    let far_m = LEAST_M.max(TIMES * usual_m);
+    let far = seen.iter().zip(&all_m).filter(|(_, off_m)| **off_m > far_m);
+    let rows: Vec<usize> = far.map(|((row, _), _)| *row).collect();
+    if rows.len() as f64 > MANY * seen.len() as f64 {
+        return Vec::new();
+    }
+    rows
+}
+
+/// Share of the sightings that are no faults of single ones.
+const MANY: f64 = 0.01;
 
 /// A number as a reader knows it again, whatever its size.
 pub(crate) fn short(number: f64) -> String {
@@ -48,8 +116,6 @@ fn strays(t_s: &[f64], position_m: &[Option<[f64; 2]>]) -> Vec<usize> {
     const OFF_M: f64 = 0.05;
     /// Time within which it has come back, s, if not with the very next sighting.
     const SOON_S: f64 = 0.6;
-    /// Share of the sightings that are many.
-    const MANY: f64 = 0.01;
     let sighting = |(row, (&time_s, position)): (usize, (&f64, &Option<[f64; 2]>))| {
         position.map(|[x_m, y_m]| Sighting {
             row,

@@ -18,7 +18,7 @@ pub(crate) fn run(session: &Session, args: &args::Trace) -> Result<()> {
         .map(|path| DataSet::load(path))
         .collect::<Result<_>>()?;
     let held_out = args.held_out.as_deref().map(DataSet::load).transpose()?;
-    each_once(sets.iter().chain(&held_out))?;
+    each_once(session, sets.iter().chain(&held_out))?;
     let mut inputs = vec![file.input.clone()];
     inputs.extend(sets.iter().flat_map(|set| set.inputs.clone()));
     inputs.extend(held_out.iter().flat_map(|set| set.inputs.clone()));
@@ -73,16 +73,20 @@ pub(crate) fn run(session: &Session, args: &args::Trace) -> Result<()> {
 }
 
 /// Whether every run is given once, however its file is packed: twice it would count for two, and held out it would be no test.
-fn each_once<'a>(sets: impl Iterator<Item = &'a DataSet>) -> Result<()> {
+fn each_once<'a>(session: &Session, sets: impl Iterator<Item = &'a DataSet>) -> Result<()> {
     let mut known: Vec<&RunFile> = Vec::new();
     for run in sets.flat_map(|set| &set.runs) {
-        if let Some(other) = known.iter().find(|other| other.rows.is_seen_as(&run.rows)) {
-            bail!(
-                "{}: the same run as {}; give each run once: what is held out must not be fitted, and what is given twice counts \
-                 twice",
-                run.path.display(),
-                other.path.display()
-            );
+        if let Some(other) = known.iter().find(|other| other.rows.begins_as(&run.rows)) {
+            let (shown, other_shown) = (run.path.display(), other.path.display());
+            if other.rows.t_s.len() == run.rows.t_s.len() {
+                bail!(
+                    "{shown}: the same run as {other_shown}; give each run once: what is held out must not be fitted, and what is \
+                     given twice counts twice"
+                );
+            }
+            session.remark(&format!(
+                "{shown} begins as {other_shown} does, to the last digit: the one tells nothing new as far as the other goes"
+            ));
         }
         known.push(run);
     }

@@ -77,6 +77,9 @@ fn atlas_of(session: &Session, recording: &Recording, purpose: Purpose, cache: &
         config.to_toml(),
         session.seed()
     );
+    if let Some(unit_m) = recording.written_m {
+        key += &format!("\npositions in {unit_m} m");
+    }
     if !alike {
         key += &format!("\n{:?}", recording.places(&[]));
     }

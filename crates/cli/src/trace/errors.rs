@@ -4,12 +4,12 @@ use std::borrow::Cow;
 use std::ops::Range;
 
 use anyhow::Result;
-use diagnose::{Answer, MeanLaps};
+use diagnose::{Answer, MeanLaps, Unseen};
 use rayon::prelude::*;
 use sim::{Setting, Step, Streams};
 use track::Lap;
 
-use super::recording::{Recording, RunPlace};
+use super::recording::{HeldOut, Recording, RunPlace};
 use crate::laps::SampledRun;
 use crate::setup::Setup;
 
@@ -41,72 +41,114 @@ pub(crate) struct Errors {
 pub(super) fn errors(
     recordings: &[Recording],
     answer: &Answer,
-    held_out: Option<(usize, Vec<SampledRun>)>,
+    held_out: Option<HeldOut>,
     seed: u64,
 ) -> Result<Vec<Errors>> {
-    let mut all = Vec::new();
-    for (place, recording) in recordings.iter().enumerate() {
-        if held_out.as_ref().is_some_and(|(at, _)| *at != place) {
-            continue;
-        }
-        let longest = recording.shape().into_iter().fold(1, usize::max);
-        let laps_of = |effects: &[Setting], runs: Range<usize>| {
-            let mut places = recording.places(effects)[runs].to_vec();
-            if held_out.is_some() {
-                // What is held out has holes of its own, or none.
-                places.iter_mut().for_each(|place| place.unseen = None);
-            }
-            mean_laps(&recording.setup, effects, seed, longest, &places)
+    let of = |place: usize| Judged {
+        recording: &recordings[place],
+        place,
+        answer,
+        seed,
+    };
+    match held_out {
+        Some(held_out) => Ok(vec![of(held_out.recording).held_out(held_out)?]),
+        None => (0..recordings.len()).map(|place| of(place).in_turn()).collect(),
+    }
+}
+
+/// A recording whose simulations an answer is judged by.
+struct Judged<'a> {
+    recording: &'a Recording,
+    /// Which of all recordings.
+    place: usize,
+    answer: &'a Answer,
+    seed: u64,
+}
+
+impl Judged<'_> {
+    /// The errors on runs that no fit has seen, each seen through its own holes.
+    fn held_out(&self, held_out: HeldOut) -> Result<Errors> {
+        let simulated = |effects: &[Setting], unseen: Option<&Unseen>| {
+            let mut places = self.recording.places(effects);
+            places
+                .iter_mut()
+                .for_each(|place| place.unseen = unseen.filter(|unseen| !unseen.is_nothing()));
+            self.mean_laps(effects, &places)
         };
-        let off_m = |laps: &MeanLaps, run: &SampledRun| laps.distance_m(&run.offsets_m());
-        let all_runs = 0..recording.measured.runs.len();
-        let before = laps_of(&[], all_runs.clone())?;
-        let settings = answer.settings();
+        let settings = self.answer.settings();
+        let mut errors = self.nothing_yet(simulated(&[], None)?, simulated(&settings, None)?);
+        for (run, unseen) in held_out.runs.into_iter().zip(&held_out.unseen) {
+            if unseen.is_nothing() {
+                let (before, after) = (errors.before.clone(), errors.after.clone());
+                errors.push(run, &before, &after, &after);
+            } else {
+                let after = simulated(&settings, Some(unseen))?;
+                errors.push(run, &simulated(&[], Some(unseen))?, &after, &after);
+            }
+        }
+        Ok(errors)
+    }
+
+    /// The errors on each measured run, of sizes that were fitted to the others.
+    fn in_turn(&self) -> Result<Errors> {
+        let recording = self.recording;
+        let simulated = |effects: &[Setting], runs: Range<usize>| {
+            self.mean_laps(effects, &recording.places(effects)[runs])
+        };
+        let runs = &recording.measured.runs;
+        let settings = self.answer.settings();
+        let before = simulated(&[], 0..runs.len())?;
         let after = if settings.is_empty() {
             before.clone()
         } else {
-            laps_of(&settings, all_runs)?
+            simulated(&settings, 0..runs.len())?
         };
-        let runs = match &held_out {
-            Some((_, runs)) => runs,
-            None => &recording.measured.runs,
-        };
-        let (mut before_m, mut after_m, mut floor_m) = (Vec::new(), Vec::new(), Vec::new());
+        let mut errors = self.nothing_yet(before.clone(), after.clone());
         for (at, run) in runs.iter().enumerate() {
-            let [own_before, own_after] = match &held_out {
-                Some(_) => [Cow::Borrowed(&before), Cow::Borrowed(&after)],
-                None => {
-                    let alone = |effects| anyhow::Ok(Cow::Owned(laps_of(effects, at..at + 1)?));
-                    let own_before = if recording.expects_the_same_of_runs() {
-                        Cow::Borrowed(&before)
-                    } else {
-                        alone(&[])?
-                    };
-                    let without = &answer.left_out[recording.first_run + at];
-                    let own_after = if without.is_empty() {
-                        own_before.clone()
-                    } else {
-                        alone(without)?
-                    };
-                    [own_before, own_after]
-                }
+            let alone = |effects| anyhow::Ok(Cow::Owned(simulated(effects, at..at + 1)?));
+            let own_before = if recording.expects_the_same_of_runs() {
+                Cow::Borrowed(&before)
+            } else {
+                alone(&[])?
+            };
+            let without = &self.answer.left_out[recording.first_run + at];
+            let own_after = if without.is_empty() {
+                own_before.clone()
+            } else {
+                alone(without)?
             };
             let of_chance = if recording.has_holes() { &own_after } else { &after };
-            before_m.push(off_m(&own_before, run));
-            after_m.push(off_m(&own_after, run));
-            floor_m.push(of_chance.floor_m(run.laps.len()));
+            errors.push(run.clone(), &own_before, &own_after, of_chance);
         }
-        all.push(Errors {
-            recording: place,
-            held_out: runs.clone(),
+        Ok(errors)
+    }
+
+    fn mean_laps(&self, effects: &[Setting], places: &[RunPlace<'_>]) -> Result<MeanLaps> {
+        let longest = self.recording.shape().into_iter().fold(1, usize::max);
+        mean_laps(&self.recording.setup, effects, self.seed, longest, places)
+    }
+
+    fn nothing_yet(&self, before: MeanLaps, after: MeanLaps) -> Errors {
+        Errors {
+            recording: self.place,
+            held_out: Vec::new(),
             before,
             after,
-            before_m,
-            after_m,
-            floor_m,
-        });
+            before_m: Vec::new(),
+            after_m: Vec::new(),
+            floor_m: Vec::new(),
+        }
     }
-    Ok(all)
+}
+
+impl Errors {
+    /// One more run, with the simulations that it is held against, and those that tell what chance does.
+    fn push(&mut self, run: SampledRun, before: &MeanLaps, after: &MeanLaps, of_chance: &MeanLaps) {
+        self.before_m.push(before.distance_m(&run.offsets_m()));
+        self.after_m.push(after.distance_m(&run.offsets_m()));
+        self.floor_m.push(of_chance.floor_m(run.laps.len()));
+        self.held_out.push(run);
+    }
 }
 
 /// The mean lap of a model with effects: of runs that take the places of some measured runs, of up to `longest` laps, in turn.

@@ -22,7 +22,7 @@ pub(super) fn decide_in_words(decide: &Decided) -> String {
         ),
         Decided::NoController { share } => format!(
             "No controller of this kind gives {:.1} % of the logged commands from the logged readings: look at the units (readings in \
-             counts, speeds in m/s) and at the controller.",
+             counts, speeds in m/s), at how they are rounded or cut, and at the controller.",
             100.0 * share
         ),
         Decided::Unknown => "No control step has both readings and commands.".to_owned(),

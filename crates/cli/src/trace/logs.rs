@@ -1,13 +1,15 @@
 //! The robot's logs, of a recording in which every run has one.
 
-use diagnose::{Implausible, LogDiagnosis, LogRow, Why, take_out_implausible};
+use std::collections::BTreeMap;
+
+use diagnose::{Implausible, LogDiagnosis, LogRow, Why, can_be_followed, take_out_implausible};
 use sim::{Model, Vec2, WheelSpeeds};
 
 use super::recording::Recording;
 use crate::dataset::{LOG_COLUMNS, RunFile};
 use crate::sightings::short;
 
-/// The logs that are used.
+/// The logs of one recording.
 #[derive(Debug)]
 pub(super) struct Logs {
     /// The number of their recording.
@@ -19,14 +21,15 @@ pub(super) struct Logs {
 }
 
 impl Logs {
-    /// The logs of the first recording in which every run has one.
+    /// The logs of the first recording in which every run has one, and one at least can be followed.
     pub(super) fn of(recordings: &[Recording]) -> Option<Self> {
         (recordings.iter().enumerate()).find_map(|(place, recording)| {
             let files = &recording.measured.set.runs;
             let model = &recording.setup.model;
             let runs: Vec<_> = files.iter().map(|run| read(run, model)).collect::<Option<_>>()?;
             let (runs, implausible): (Vec<_>, Vec<_>) = runs.into_iter().unzip();
-            Some(Self {
+            let followed = runs.iter().any(|rows| can_be_followed(rows, model));
+            followed.then(|| Self {
                 recording: place,
                 runs,
                 implausible: implausible.concat(),
@@ -46,34 +49,55 @@ fn read(run: &RunFile, model: &Model) -> Option<(Vec<LogRow>, Vec<String>)> {
             left_m_s: log.left_m_s[i],
             right_m_s: log.right_m_s[i],
         },
+        doubt_m: 0.0,
     };
     let mut rows: Vec<LogRow> = run.rows.since_start_s().enumerate().map(row).collect();
-    let say = |found: Implausible| {
-        let why = match found.why {
-            Why::OutOfRange => "which this robot cannot write",
-            Why::Spike => "far from what it is in the rows before and after",
-        };
-        let (place, column, value) = (
-            run.place(found.row),
-            LOG_COLUMNS[found.column],
-            short(found.value),
-        );
-        format!("{place}: {column} is {value}, {why}; taken as missing")
-    };
     let implausible = take_out_implausible(&mut rows, model);
-    Some((rows, implausible.into_iter().map(say).collect()))
+    Some((rows, implausible_in_words(run, &implausible)))
 }
 
-/// The rows that a diagnosis of a recording's logs did not use, in words.
-pub(super) fn spoilt_in_words(recording: &Recording, found: &LogDiagnosis) -> Vec<String> {
+/// Values of a log that are not used, in words: of a column and a reason together.
+fn implausible_in_words(run: &RunFile, found: &[Implausible]) -> Vec<String> {
+    let mut words = Vec::new();
+    for (column, name) in LOG_COLUMNS.into_iter().enumerate() {
+        for (reason, because) in [
+            (Why::OutOfRange, "which this robot cannot write"),
+            (Why::Spike, "far from what it is in the rows before and after"),
+        ] {
+            let of_both = found
+                .iter()
+                .filter(|one| (one.column, one.why) == (column, reason));
+            let values: BTreeMap<usize, f64> = of_both.map(|one| (one.row, one.value)).collect();
+            let rows: Vec<usize> = values.keys().copied().collect();
+            let what = |row: usize| format!("{name} is {}, {because}", short(values[&row]));
+            words.extend(run.tell(&rows, what, "taken as missing"));
+        }
+    }
+    words
+}
+
+/// What a reader must know of the logs that a diagnosis did not use, in words.
+pub(super) fn unused_in_words(recording: &Recording, logs: &Logs, found: &LogDiagnosis) -> Vec<String> {
+    /// Share of the rows of which it is said if no more are used.
+    const MOST: f64 = 0.9;
+    let mut words = spoilt_in_words(recording, found);
+    let rows: usize = logs.runs.iter().map(Vec::len).sum();
+    if (found.steps as f64) < MOST * rows as f64 {
+        words.push(format!(
+            "Of {rows} rows of logs {} are used: those in stretches of 200 and more in which a row and its command are there for \
+             nearly every control step.",
+            found.steps
+        ));
+    }
+    words
+}
+
+/// The rows whose commands do not follow from their readings, in words.
+fn spoilt_in_words(recording: &Recording, found: &LogDiagnosis) -> Vec<String> {
     let of_run = |(run, rows): (&RunFile, &Vec<usize>)| -> Vec<String> {
-        let say = |&row: &usize| {
-            format!(
-                "{}: the command does not follow from the readings as those of the other rows do; taken as missing",
-                run.place(row)
-            )
-        };
-        rows.iter().map(say).collect()
+        let what =
+            |_| "the command does not follow from the readings as those of the other rows do".to_owned();
+        run.tell(rows, what, "taken as missing")
     };
     let runs = recording.measured.set.runs.iter().zip(&found.spoilt);
     runs.flat_map(of_run).collect()

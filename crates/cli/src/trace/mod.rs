@@ -27,7 +27,7 @@ pub(crate) use document::{document, parameters};
 pub(crate) use errors::Errors;
 use errors::errors;
 use limits::decide_in_words;
-use logs::{Logs, spoilt_in_words};
+use logs::{Logs, unused_in_words};
 use next::{Experiment, experiments};
 pub(crate) use pages::{digest, gates_csv, sections, summary};
 use recording::{Recording, Seeds, held_out, observed_laps, simulate_all};
@@ -120,7 +120,7 @@ impl Trace {
         let errors = errors(&recordings, &named.answer, unseen, seed)?;
         interrupt::check()?;
         if let (Some(found), Some(logs)) = (&named.from_logs, &logged) {
-            remarks.extend(spoilt_in_words(&recordings[logs.recording], &found.logs));
+            remarks.extend(unused_in_words(&recordings[logs.recording], logs, &found.logs));
             if matches!(found.logs.decide, Decided::NoController { .. }) {
                 remarks.push(decide_in_words(&found.logs.decide));
             }

@@ -24,6 +24,8 @@ pub(crate) struct Recording {
     pub(super) cuts: Vec<Setup>,
     /// Where in its laps the camera did not see the robot, run by run.
     pub(super) unseen: Vec<Unseen>,
+    /// What its positions are multiples of, m, if that is coarse: to the model that is noise of the camera.
+    pub(super) written_m: Option<f64>,
     /// Text of the world file.
     pub(super) world: String,
     /// Its first run's number among those of all recordings.
@@ -118,8 +120,13 @@ impl Recording {
             .iter()
             .flat_map(SampledRun::remarks)
             .for_each(|remark| session.remark(&remark));
-        let setup =
+        let mut setup =
             Setup::new(&config, circuit, None).map_err(|error| setup::locate(file, &source, error))?;
+        let written_m = written_m(&measured.set.runs);
+        if let Some(unit_m) = written_m {
+            let noise_m = &mut setup.model.machine.camera_noise_m;
+            *noise_m = noise_m.hypot(unit_m / 12.0_f64.sqrt());
+        }
         in_seconds(&measured, &setup)?;
         let step_s = setup.model.run.control_step_s;
         for run in &measured.set.runs {
@@ -132,18 +139,13 @@ impl Recording {
                 model: setup.model.clone(),
             })
             .collect();
-        let unseen = (measured.runs.iter().enumerate())
-            .map(|(i, run)| {
-                let seen_s: Vec<f64> = measured.seen(i).map(|(time_s, _)| time_s).collect();
-                Unseen::of(&run.laps, &seen_s, step_s)
-            })
-            .collect();
         Ok(Self {
+            unseen: unseen(&measured, step_s),
+            written_m,
             config,
             setup,
             measured,
             cuts,
-            unseen,
             world: source.text,
             first_run,
         })
@@ -166,6 +168,29 @@ impl Recording {
     /// Whether the declared model leads one to expect the same laps of every run, wherever the run starts.
     pub(super) fn expects_the_same_of_runs(&self) -> bool {
         self.runs_are_alike() && !self.has_holes()
+    }
+
+    /// Clocks that do not show as much time as there were control steps, in words.
+    pub(super) fn clocks_in_words(&self) -> Vec<String> {
+        /// Share by which a clock may be off.
+        const OFF: f64 = 1e-3;
+        let step_s = self.setup.model.run.control_step_s;
+        let of_run = |(run, file): (&SampledRun, &RunFile)| {
+            let steps = file.rows.t_s.windows(2).map(|pair| pair[1] - pair[0]);
+            let next: Vec<f64> = steps.filter(|apart_s| *apart_s < 1.5 * step_s).collect();
+            let mean_s = next.iter().sum::<f64>() / next.len() as f64;
+            ((mean_s / step_s - 1.0).abs() > OFF).then(|| {
+                format!(
+                    "Run {}: its rows are {:.2} ms apart, and a control step is {} ms: whatever takes time in its laps is by that \
+                     clock.",
+                    run.name,
+                    1000.0 * mean_s,
+                    1000.0 * step_s
+                )
+            })
+        };
+        let runs = self.measured.runs.iter().zip(&self.measured.set.runs);
+        runs.filter_map(of_run).collect()
     }
 
     /// Whether the camera did not see the robot throughout its laps.
@@ -277,15 +302,21 @@ pub(super) fn simulate_all(
     Some(parts.collect::<Option<Vec<_>>>()?.concat())
 }
 
+/// Runs that no fit has seen.
+#[derive(Debug)]
+pub(super) struct HeldOut {
+    /// The number of the recording that declares the same.
+    pub(super) recording: usize,
+    pub(super) runs: Vec<SampledRun>,
+    /// Where in its laps the camera did not see the robot, run by run.
+    pub(super) unseen: Vec<Unseen>,
+}
+
 /// Runs that no fit has seen, on the circuit of a recording that declares the same.
 ///
 /// # Errors
 /// Data of another world, controller or declaration.
-pub(super) fn held_out(
-    recordings: &[Recording],
-    file: &ModelFile,
-    set: DataSet,
-) -> Result<(usize, Vec<SampledRun>)> {
+pub(super) fn held_out(recordings: &[Recording], file: &ModelFile, set: DataSet) -> Result<HeldOut> {
     let config = set.declared_config(&file.config)?;
     let shown = set.folder.display().to_string();
     let place = recordings
@@ -297,8 +328,35 @@ pub(super) fn held_out(
             )
         })?;
     belongs(&set, &config, &recordings[place].world)?;
-    let circuit = recordings[place].measured.circuit.clone();
-    Ok((place, Measured::on(set, circuit)?.runs))
+    let Recording { measured, setup, .. } = &recordings[place];
+    let measured = Measured::on(set, measured.circuit.clone())?;
+    Ok(HeldOut {
+        recording: place,
+        unseen: unseen(&measured, setup.model.run.control_step_s),
+        runs: measured.runs,
+    })
+}
+
+/// Where in its laps the camera did not see the robot, run by run.
+fn unseen(measured: &Measured, step_s: f64) -> Vec<Unseen> {
+    let of_run = |(i, run): (usize, &SampledRun)| {
+        let seen_s: Vec<f64> = measured.seen(i).map(|(time_s, _)| time_s).collect();
+        Unseen::of(&run.laps, &seen_s, step_s)
+    };
+    measured.runs.iter().enumerate().map(of_run).collect()
+}
+
+/// What the positions of some runs are multiples of, m, if that is coarse.
+fn written_m(runs: &[RunFile]) -> Option<f64> {
+    const COARSE_M: [f64; 3] = [0.01, 0.005, 0.001];
+    let positions = || {
+        runs.iter()
+            .flat_map(|run| run.rows.position_m.iter().flatten().flatten())
+    };
+    let is_multiple = |x: f64| (x - x.round()).abs() < 1e-6;
+    COARSE_M
+        .into_iter()
+        .find(|unit| positions().all(|x| is_multiple(x / unit)))
 }
 
 /// Refuses data that are not the model's.

@@ -16,6 +16,14 @@ pub(super) fn remarks(recordings: &[Recording], logged: Option<&Logs>) -> Vec<St
         );
     }
     for recording in recordings {
+        if let Some(unit_m) = recording.written_m {
+            remarks.push(format!(
+                "{}: positions are written to {} mm: the simulated camera is as much noisier.",
+                recording.measured.set.name,
+                1000.0 * unit_m
+            ));
+        }
+        remarks.extend(recording.clocks_in_words());
         let gates = recording.measured.circuit.gates.len();
         for (run, unseen) in recording.measured.runs.iter().zip(&recording.unseen) {
             remarks.extend(run.strays.iter().cloned().chain(run.laps_set_aside()));
@@ -56,7 +64,13 @@ pub(super) fn remarks(recordings: &[Recording], logged: Option<&Logs>) -> Vec<St
         if used != Some(place) && count > 0 {
             let why = match used {
                 Some(_) => "those of another data set are used: trace this one alone to use them",
-                None => "a log in every run is needed: leave out the runs without one to use them",
+                None if count < set.runs.len() => {
+                    "a log in every run is needed: leave out the runs without one to use them"
+                }
+                None => {
+                    "a stretch of 200 rows is needed in which a row and its command are there for nearly every control step, and \
+                     the camera saw the robot"
+                }
             };
             remarks.push(format!(
                 "The logs of {} ({count} runs) are not used; {why}.",

@@ -14,7 +14,11 @@ pub struct Unseen {
 
 impl Unseen {
     /// What was not seen of closed laps by a camera that saw the robot at these times, rising, and would have every `step_s`.
+    /// A few short holes change no sample, and are none.
     pub fn of(laps: &[Lap], seen_s: &[f64], step_s: f64) -> Self {
+        /// Gates up to which a hole is short, and share of the way up to which holes are few.
+        const SHORT: f64 = 0.5;
+        const FEW: f64 = 2e-3;
         let holes: Vec<[f64; 2]> = (seen_s.windows(2))
             .filter(|pair| pair[1] - pair[0] > 1.5 * step_s)
             .map(|pair| [pair[0] + 0.5 * step_s, pair[1] - 0.5 * step_s])
@@ -25,9 +29,15 @@ impl Unseen {
             let place = |hole: &[f64; 2]| hole.map(|time_s| place_at(&crossings_s, time_s));
             holes.iter().filter(inside).map(place).collect()
         };
-        Self {
+        let all = Self {
             laps: laps.iter().map(of_lap).collect(),
+        };
+        let is_short = |[from, to]: &[f64; 2]| to - from < SHORT;
+        let gates = laps.first().map_or(1, |lap| lap.times_s.len());
+        if all.laps.iter().flatten().all(is_short) && all.share(gates) < FEW {
+            return Self::default();
         }
+        all
     }
 
     /// Whether the robot was seen throughout.

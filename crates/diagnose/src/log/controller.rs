@@ -7,9 +7,8 @@ use sim::{Controller, Model};
 use super::rows::LogRow;
 use super::steps::written_counts;
 
-/// Largest error of a written speed, which has 5 decimals, and its standard deviation.
+/// Largest error of a speed that is written with 5 decimals; its standard deviation is about half of that.
 pub(crate) const SPEED_ROUNDING_M_S: f64 = 6e-6;
-const SPEED_DEVIATION_M_S: f64 = 3e-6;
 /// Share of the control steps that may miss by more, where a command was cut or a file was mended.
 pub(crate) const FORGIVEN: f64 = 2e-3;
 
@@ -30,9 +29,25 @@ struct Run {
     choices: Vec<Choice>,
     /// What its readings are multiples of: 0.1 where they have one decimal.
     written_counts: f64,
+    /// What its commands are multiples of, if they are coarser than with 5 decimals.
+    written_m_s: f64,
 }
 
 impl Run {
+    fn new(model: &Model, rows: &[LogRow]) -> Self {
+        let choices = choices(model, rows);
+        Self {
+            written_m_s: written_m_s(&choices),
+            written_counts: written_counts(rows),
+            choices,
+        }
+    }
+
+    /// Largest error of a written command.
+    fn speed_rounding_m_s(&self) -> f64 {
+        SPEED_ROUNDING_M_S.max(0.6 * self.written_m_s)
+    }
+
     /// Largest error of a sum of three readings.
     fn sum_rounding_counts(&self) -> f64 {
         1.6 * self.written_counts
@@ -62,12 +77,7 @@ pub(crate) struct Constants {
 /// The constants by each run's log, changing in time only if they explain the logs in no other way; `None` where a log tells
 /// nothing.
 pub(crate) fn constants_by_run(model: &Model, runs: &[&[LogRow]]) -> Vec<Option<Constants>> {
-    let runs: Vec<Run> = (runs.iter())
-        .map(|rows| Run {
-            choices: choices(model, rows),
-            written_counts: written_counts(rows),
-        })
-        .collect();
+    let runs: Vec<Run> = runs.iter().map(|rows| Run::new(model, rows)).collect();
     let fit = |sloped: bool| -> Vec<Option<Constants>> {
         (runs.iter())
             .map(|run| (!run.choices.is_empty()).then(|| constants(model, run, sloped)))
@@ -84,6 +94,23 @@ pub(crate) fn constants_by_run(model: &Model, runs: &[&[LogRow]]) -> Vec<Option<
 /// The largest share of a run's choices that its constants do not explain.
 pub(crate) fn most_missed(runs: &[Option<Constants>]) -> f64 {
     runs.iter().flatten().map(|run| run.missed).fold(0.0, f64::max)
+}
+
+/// The power of ten, from 5 to 2 decimals, that all commands are multiples of; 5 where they have too few values to tell.
+fn written_m_s(choices: &[Choice]) -> f64 {
+    const FINEST: i32 = 5;
+    const COARSEST: i32 = 2;
+    const VALUES: usize = 12;
+    let unit = |decimals: i32| 10.0_f64.powi(-decimals);
+    let in_units = |decimals: i32| {
+        let of_choice = move |c: &Choice| [c.left_m_s, c.right_m_s].map(|speed| speed / unit(decimals));
+        choices.iter().flat_map(of_choice)
+    };
+    let values: BTreeSet<i64> = in_units(FINEST).map(|speed| speed.round() as i64).collect();
+    let is_multiple = |speed: f64| (speed - speed.round()).abs() < 1e-4;
+    let holds = |&decimals: &i32| in_units(decimals).all(is_multiple);
+    let decimals = (COARSEST..FINEST).find(holds).filter(|_| values.len() > VALUES);
+    unit(decimals.unwrap_or(FINEST))
 }
 
 fn choices(model: &Model, rows: &[LogRow]) -> Vec<Choice> {
@@ -109,17 +136,11 @@ fn constants(model: &Model, run: &Run, sloped: bool) -> Constants {
     }
 }
 
-/// The rows of a run's choices that are not among those kept, both rising.
-fn spoilt(run: &Run, kept: &[Choice]) -> Vec<usize> {
-    let kept: BTreeSet<usize> = kept.iter().map(|choice| choice.row).collect();
-    let rows = run.choices.iter().map(|choice| choice.row);
-    rows.filter(|row| !kept.contains(row)).collect()
-}
-
-/// The choices without those few, if they are few, that are far off what is fitted to the others: one of them would decide least
-/// squares.
-fn without_spoilt<F>(
+/// The choices but for those that are far off what is fitted to the others, to begin with by medians: one of them would decide
+/// least squares.
+fn near<F>(
     choices: &[Choice],
+    begin: F,
     fit: impl Fn(&[Choice]) -> F,
     off: impl Fn(&F, &Choice) -> f64,
 ) -> Vec<Choice> {
@@ -127,31 +148,46 @@ fn without_spoilt<F>(
     const FAR: f64 = 20.0;
     const NEAR_M_S: f64 = SPEED_ROUNDING_M_S;
     const ROUNDS: usize = 5;
-    let mut kept = choices.to_vec();
+    let mut fitted = begin;
+    let mut kept: Vec<Choice> = Vec::new();
     for _ in 0..ROUNDS {
-        let fitted = fit(&kept);
         let offs: Vec<f64> = choices.iter().map(|choice| off(&fitted, choice)).collect();
-        let middle = offs.len() / 2;
-        let half = *offs.clone().select_nth_unstable_by(middle, f64::total_cmp).1;
-        let near = |off: f64| off <= FAR * half.max(NEAR_M_S);
-        let pairs = choices.iter().zip(&offs).filter(|(_, off)| near(**off));
+        let most = FAR * median(offs.iter().copied()).max(NEAR_M_S);
+        let pairs = choices.iter().zip(&offs).filter(|(_, off)| **off <= most);
         let next: Vec<Choice> = pairs.map(|(choice, _)| *choice).collect();
-        let spoilt = choices.len() - next.len();
-        if spoilt > few(choices.len()) {
-            return choices.to_vec();
-        }
         let same = next.len() == kept.len();
         kept = next;
         if same {
             break;
         }
+        fitted = fit(&kept);
     }
     kept
 }
 
-/// How many of so many choices may be spoilt.
-fn few(choices: usize) -> usize {
-    (FORGIVEN * choices as f64) as usize
+/// The share of a run's choices that constants miss, without those that are not near where these are few, and then their rows.
+fn missed(run: &Run, near: &[Choice], is_missed: impl Fn(&Choice) -> bool) -> (f64, Vec<usize>) {
+    /// Share of the choices that may be spoilt.
+    const FEW: f64 = 5e-3;
+    let share = |choices: &[Choice]| {
+        choices.iter().filter(|choice| is_missed(choice)).count() as f64 / choices.len() as f64
+    };
+    if ((run.choices.len() - near.len()) as f64) > FEW * run.choices.len() as f64 {
+        return (share(&run.choices), Vec::new());
+    }
+    let kept: BTreeSet<usize> = near.iter().map(|choice| choice.row).collect();
+    let rows = run.choices.iter().map(|choice| choice.row);
+    (share(near), rows.filter(|row| !kept.contains(row)).collect())
+}
+
+/// The value that half of the others are below; 0 of none.
+pub(crate) fn median(values: impl Iterator<Item = f64>) -> f64 {
+    let mut values: Vec<f64> = values.collect();
+    if values.is_empty() {
+        return 0.0;
+    }
+    let middle = values.len() / 2;
+    *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
 /// V and K by least squares: the mean of the speeds is V, half their difference V K (Sl - Sr).
@@ -172,28 +208,43 @@ fn braitenberg(run: &Run, sloped: bool) -> Constants {
             .abs()
             .max((c.right_m_s - speed + turn).abs())
     };
-    let choices = &without_spoilt(&run.choices, fit, off);
+    let choices = &near(&run.choices, by_medians(&run.choices), fit, off);
     let [mean, product] = fit(choices);
-    let missed = |c: &&Choice| {
+    let (missed, spoilt) = missed(run, choices, |c| {
         let speed = mean[0] + mean[1] * c.time_s;
         let slope = product[0] + product[1] * c.time_s;
-        let allowed = SPEED_ROUNDING_M_S
+        let allowed = run.speed_rounding_m_s()
             + 2.0 * run.sum_rounding_counts() * slope.abs()
             + 2e-4 * speed.abs() * f64::from(u8::from(sloped));
         off(&[mean, product], c) > allowed
-    };
+    });
     let gain = product[0] / mean[0];
-    let deviation_m_s =
-        SPEED_DEVIATION_M_S.hypot(product[0] * std::f64::consts::SQRT_2 * run.sum_deviation_counts());
+    let deviation_m_s = (0.5 * run.speed_rounding_m_s())
+        .hypot(product[0] * std::f64::consts::SQRT_2 * run.sum_deviation_counts());
     let slope_error = deviation_m_s * error_of_slope(choices.iter().map(difference), run.written_counts);
     Constants {
         speed_m_s: mean,
         // (a + b t) / (c + d t) to first order in time.
         parameter: [gain, (product[1] - gain * mean[1]) / mean[0]],
         parameter_error: slope_error / mean[0].abs() + 1e-9 * gain.abs(),
-        missed: run.choices.iter().filter(missed).count() as f64 / run.choices.len() as f64,
-        spoilt: spoilt(run, choices),
+        missed,
+        spoilt,
     }
+}
+
+/// V and K by the medians of what single choices say: not exact where they go over time, but never far off.
+fn by_medians(choices: &[Choice]) -> [Line; 2] {
+    let difference = |c: &Choice| c.left_counts - c.right_counts;
+    let usual = median(choices.iter().map(|c| difference(c).abs()));
+    let telling = choices.iter().filter(|c| difference(c).abs() >= usual.max(1e-9));
+    let turn = |c: &Choice| 0.5 * (c.left_m_s - c.right_m_s) / difference(c);
+    [
+        [
+            median(choices.iter().map(|c| 0.5 * (c.left_m_s + c.right_m_s))),
+            0.0,
+        ],
+        [median(telling.map(turn)), 0.0],
+    ]
 }
 
 /// Error of the slope of a line through the origin, where points with the same x share an error of unit
@@ -221,9 +272,10 @@ fn rules(run: &Run, declared_counts: f64, sloped: bool) -> Constants {
             .abs()
             .max((c.right_m_s.abs() - size).abs())
     };
-    let choices = without_spoilt(&run.choices, fit, off);
+    let usual = median((run.choices.iter()).map(|c| 0.5 * (c.left_m_s.abs() + c.right_m_s.abs())));
+    let choices = near(&run.choices, [usual, 0.0], fit, off);
     let speed = fit(&choices);
-    let choices = &without_wrong_turns(choices, rounding_counts);
+    let choices = &without_wrong_turns(&choices, rounding_counts);
     let bracket = |slope: f64| {
         let (mut low, mut high) = (0.0_f64, f64::INFINITY);
         for c in choices {
@@ -257,7 +309,7 @@ fn rules(run: &Run, declared_counts: f64, sloped: bool) -> Constants {
     } else {
         0.5 * (low + high.min(low + 1e3))
     };
-    let missed = |c: &&Choice| {
+    let (missed, spoilt) = missed(run, choices, |c| {
         let limit = threshold + slope * c.time_s;
         let near =
             |sum: f64| (sum - limit).abs() <= rounding_counts + 0.01 * limit * f64::from(u8::from(sloped));
@@ -265,24 +317,23 @@ fn rules(run: &Run, declared_counts: f64, sloped: bool) -> Constants {
         let turns_right = !turns_left && c.left_counts > limit;
         let size = speed[0] + speed[1] * c.time_s;
         let wrong_way = turns_left != (c.left_m_s < 0.0) || turns_right != (c.right_m_s < 0.0);
-        let allowed = SPEED_ROUNDING_M_S + 2e-4 * size * f64::from(u8::from(sloped));
+        let allowed = run.speed_rounding_m_s() + 2e-4 * size * f64::from(u8::from(sloped));
         let wrong_size = off(&speed, c) > allowed;
         wrong_size || wrong_way && !near(c.right_counts) && !near(c.left_counts)
-    };
+    });
     Constants {
         speed_m_s: speed,
         parameter: [threshold, slope],
         parameter_error: ((high - low) / 12.0_f64.sqrt())
             .hypot(run.sum_deviation_counts())
             .min(0.1 * declared_counts),
-        missed: run.choices.iter().filter(missed).count() as f64 / run.choices.len() as f64,
-        spoilt: spoilt(run, choices),
+        missed,
+        spoilt,
     }
 }
 
-/// The choices without those few, if they are few, in which the robot turned, or did not, against what the others say of the
-/// threshold.
-fn without_wrong_turns(choices: Vec<Choice>, rounding_counts: f64) -> Vec<Choice> {
+/// The choices without those in which the robot turned, or did not, against what most say of the threshold.
+fn without_wrong_turns(choices: &[Choice], rounding_counts: f64) -> Vec<Choice> {
     // Each sum that the rules look at, and whether it was found to be above the threshold.
     let sums = |c: &Choice| {
         let (turns_left, turns_right) = (c.left_m_s < 0.0, c.right_m_s < 0.0);
@@ -306,13 +357,8 @@ fn without_wrong_turns(choices: Vec<Choice>, rounding_counts: f64) -> Vec<Choice
     }
     let contradicts =
         |(sum, above): (f64, bool)| (sum > limit) != above && (sum - limit).abs() > rounding_counts;
-    let (spoilt, others): (Vec<Choice>, Vec<Choice>) =
-        (choices.iter().copied()).partition(|c| sums(c).into_iter().flatten().any(contradicts));
-    if spoilt.len() > few(choices.len()) {
-        choices
-    } else {
-        others
-    }
+    let holds = |c: &&Choice| !sums(c).into_iter().flatten().any(contradicts);
+    choices.iter().filter(holds).copied().collect()
 }
 
 /// Least squares of y = (a + b t) x; b only if `sloped`.
@@ -371,6 +417,7 @@ mod tests {
         let run = Run {
             choices: (0..6000).map(step).collect(),
             written_counts: 0.1,
+            written_m_s: 1e-5,
         };
         let found = braitenberg(&run, false);
         let off = (found.parameter[0] - GAIN).abs();
@@ -397,6 +444,7 @@ mod tests {
         Run {
             choices: (0..steps).map(step).collect(),
             written_counts: 0.1,
+            written_m_s: 1e-5,
         }
     }
 
@@ -438,6 +486,7 @@ mod tests {
         let run = Run {
             choices,
             written_counts: 0.1,
+            written_m_s: 1e-5,
         };
         let found = rules(&run, THRESHOLD, false);
         assert_eq!(found.spoilt, [8, 900, 1700]);
@@ -454,6 +503,7 @@ mod tests {
                 .map(|(i, sum)| chosen(0.064 * i as f64, *sum, THRESHOLD))
                 .collect(),
             written_counts: 0.1,
+            written_m_s: 1e-5,
         };
         let found = rules(&run, 300.0, false);
         // Both sums next to the threshold are written as 410.0.

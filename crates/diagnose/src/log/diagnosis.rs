@@ -11,7 +11,7 @@ use super::filter::MEASURED;
 use super::groups::unlisted_variants;
 use super::recut::recut;
 use super::refined::Refined;
-use super::rows::{LogRow, without_logs};
+use super::rows::{LogRow, bridged, without_logs};
 use super::search::Search;
 use super::steps::{reading_step, written_step};
 use super::unnamed::Unnamed;
@@ -58,7 +58,7 @@ pub fn diagnose_logs(
     let decision = decision(model, runs);
     let (decide, spoilt) = (decision.decided, decision.spoilt);
     let mended: Vec<Vec<LogRow>> = (runs.iter().zip(&spoilt))
-        .map(|(rows, spoilt)| without_logs(rows, spoilt))
+        .map(|(rows, spoilt)| bridged(&without_logs(rows, spoilt), &model.run))
         .collect();
     let runs: &[&[LogRow]] = &mended.iter().map(Vec::as_slice).collect::<Vec<_>>();
     let (wide, scene) = widened(model, scene)?;

@@ -310,10 +310,14 @@ fn step(
     );
     instant.moved_from = state.pose;
     let motion = forecast.motion(state.pose, row.command);
+    let doubt = doubt(forecast, row);
     let mut covariance = carried(&state.covariance, motion.turned);
     for i in 0..3 {
         for j in 0..3 {
             covariance[i][j] += motion.covariance[i][j];
+        }
+        if row.doubt_m > 0.0 {
+            covariance[i][i] += doubt[i];
         }
     }
     (instant.moved_to, instant.turned) = (motion.pose, motion.turned);
@@ -325,6 +329,13 @@ fn step(
         ..State::new(motion.pose, covariance)
     };
     instant
+}
+
+/// What a command that was not logged adds to the variance of x and y, m2, and of the heading, rad2.
+fn doubt(forecast: &Forecast<'_>, row: &LogRow) -> [f64; 3] {
+    let way_m2 = row.doubt_m * row.doubt_m;
+    let turn = 2.0 * way_m2 / forecast.machine().robot.axle_m.powi(2);
+    [way_m2, way_m2, turn]
 }
 
 /// The camera's position.

@@ -2,6 +2,7 @@
 
 use sim::Model;
 
+use super::controller::median;
 use super::rows::LogRow;
 
 /// A value that was taken out of a log.
@@ -22,12 +23,12 @@ pub struct Implausible {
 pub enum Why {
     /// No robot of the model writes it.
     OutOfRange,
-    /// A reading far from those of the same sensor in the rows before and after, which are near each other.
+    /// A reading that for a few rows is far from those of the same sensor before and after.
     Spike,
 }
 
 /// Takes single values out of a run's log that its robot cannot have written, or that something spoilt, and says which: readings
-/// outside the sensors' range and commands beyond the wheels' limit, and readings that leap away for one row. None of a sort if
+/// outside the sensors' range and commands beyond the wheels' limit, and readings that leap away for a few rows. None of a sort if
 /// there are many of it: that is another unit, or another robot, and no fault of single values.
 pub fn take_out_implausible(rows: &mut [LogRow], model: &Model) -> Vec<Implausible> {
     let mut found = taken_out(rows, out_of_range(rows, model));
@@ -41,7 +42,7 @@ pub fn take_out_implausible(rows: &mut [LogRow], model: &Model) -> Vec<Implausib
 /// Values are taken out if they are few.
 fn taken_out(rows: &mut [LogRow], found: Vec<Implausible>) -> Vec<Implausible> {
     const FEW: usize = 3;
-    const FEW_OF_ALL: f64 = 1e-3;
+    const FEW_OF_ALL: f64 = 0.01;
     if found.len() > FEW.max((FEW_OF_ALL * rows.len() as f64) as usize) {
         return Vec::new();
     }
@@ -70,33 +71,32 @@ fn out_of_range(rows: &[LogRow], model: &Model) -> Vec<Implausible> {
     found
 }
 
-/// Readings of one sensor that leap away for one row, much farther than others do by their noise.
+/// Readings of one sensor that leap away for a few rows, much farther from the median of those about them than others do.
 fn spikes(rows: &[LogRow], sensor: usize) -> Vec<Implausible> {
-    /// Share of the rows that tell how far the noise goes, and how many times as far a spike leaps.
-    const TAIL: f64 = 5e-3;
+    /// Rows to either side of which the median is taken: what lasts no longer is a spike.
+    const REACH: usize = 4;
+    /// Share of the rows that tell how far noise and edges go, and how many times as far a spike leaps.
+    const TAIL: f64 = 0.02;
     const TIMES: f64 = 6.0;
     /// What is no spike in any case, counts.
     const LEAST_COUNTS: f64 = 200.0;
     let reading = |row: usize| rows[row].readings[sensor];
-    let leap = |row: usize| {
-        let (from, to) = (reading(row) - reading(row - 1), reading(row) - reading(row + 1));
-        // NaN where one of them is missing, which is no leap.
-        if from * to > 0.0 {
-            from.abs().min(to.abs())
-        } else {
-            0.0
-        }
+    let places: Vec<usize> = (0..rows.len()).filter(|&row| reading(row).is_finite()).collect();
+    let leap = |at: usize| {
+        let about = at.saturating_sub(REACH)..places.len().min(at + REACH + 1);
+        (reading(places[at]) - median(about.map(|at| reading(places[at])))).abs()
     };
-    let places = 1..rows.len().saturating_sub(1);
-    let mut leaps: Vec<f64> = places.clone().map(leap).collect();
+    let leaps: Vec<f64> = (0..places.len()).map(leap).collect();
     if leaps.is_empty() {
         return Vec::new();
     }
-    let rank = (TAIL * leaps.len() as f64) as usize;
-    let usual = *leaps.select_nth_unstable_by(rank, |a, b| b.total_cmp(a)).1;
-    places
-        .filter(|&row| leap(row) > LEAST_COUNTS.max(TIMES * usual))
-        .map(|row| Implausible {
+    let mut sorted = leaps.clone();
+    let rank = (TAIL * sorted.len() as f64) as usize;
+    let usual = *sorted.select_nth_unstable_by(rank, |a, b| b.total_cmp(a)).1;
+    let far = LEAST_COUNTS.max(TIMES * usual);
+    (places.iter().zip(leaps))
+        .filter(|(_, leap)| *leap > far)
+        .map(|(&row, _)| Implausible {
             row,
             column: sensor,
             value: reading(row),
@@ -157,26 +157,27 @@ mod tests {
                     left_m_s: 0.05,
                     right_m_s: 0.05,
                 },
+                doubt_m: 0.0,
             }
         };
         (0..4000).map(row).collect()
     }
 
     #[test]
-    fn readings_that_leap_away_for_one_row_are_spikes_and_edges_and_noise_are_none() {
+    fn readings_that_leap_away_for_a_few_rows_are_spikes_and_edges_and_noise_are_none() {
         for noise_counts in [0.0, 10.0, 150.0] {
             let mut log = rows(noise_counts);
             assert_eq!((0..8).map(|sensor| spikes(&log, sensor).len()).sum::<usize>(), 0);
-            log[1234].readings[4] = 3900.0;
+            (1234..1237).for_each(|row| log[row].readings[4] = 3900.0);
             let found = spikes(&log, 4);
             let found = taken_out(&mut log, found);
-            let expected = Implausible {
-                row: 1234,
+            let expected = |row| Implausible {
+                row,
                 column: 4,
                 value: 3900.0,
                 why: Why::Spike,
             };
-            assert_eq!(found, [expected]);
+            assert_eq!(found, [1234, 1235, 1236].map(expected));
             assert!(log[1234].readings[4].is_nan() && log[1234].read().is_none());
         }
     }
@@ -184,10 +185,10 @@ mod tests {
     #[test]
     fn many_are_no_fault_of_single_values() {
         let mut log = rows(10.0);
-        (0..10).for_each(|i| log[50 + 400 * i].readings[4] += 2500.0);
+        (0..50).for_each(|i| log[50 + 77 * i].readings[4] += 2500.0);
         let before = log.clone();
         let found = spikes(&log, 4);
-        assert_eq!((found.len(), taken_out(&mut log, found)), (10, Vec::new()));
+        assert_eq!((found.len(), taken_out(&mut log, found)), (50, Vec::new()));
         assert_eq!(log, before);
     }
 }

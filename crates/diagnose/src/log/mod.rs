@@ -49,5 +49,5 @@ pub use channels::Channel;
 pub use decide::Decided;
 pub use diagnosis::{LogDiagnosis, diagnose_logs};
 pub use implausible::{Implausible, Why, take_out_implausible};
-pub use rows::LogRow;
+pub use rows::{LogRow, can_be_followed};
 pub use separation::log_separation;

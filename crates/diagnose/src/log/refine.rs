@@ -150,12 +150,51 @@ pub(crate) fn pooled(assessment: &Assessment, count: usize) -> (DMatrix<f64>, DV
     )
 }
 
+/// The best delay: trial delays about the best one so far, in whole physics steps, as all others do what the nearest of these
+/// does.
+pub(crate) fn hunt_delay(evidence: &Evidence<'_>, setting: &Setting) -> Option<Fitted> {
+    let rules = &evidence.model.run;
+    let step_s = rules.control_step_s / f64::from(rules.physics_steps);
+    let (Pattern::Constant(values), param) = (&setting.pattern, &setting.spec.params[0]) else {
+        return None;
+    };
+    let at = |steps: i64| -> Option<(i64, f64)> {
+        let delay_s = (steps as f64 * step_s).clamp(param.low, param.high);
+        let log_likelihood = evidence.likelihood(&[Setting::constant(setting.spec, [delay_s])])?;
+        Some((steps, log_likelihood))
+    };
+    let mut best = at((values[0] / step_s).round() as i64)?;
+    loop {
+        let about = [-2, -1, 1, 2].map(|by| best.0 + by);
+        let tried = about.into_iter().filter(|steps| *steps >= 0).filter_map(at);
+        match tried.max_by(|a, b| a.1.total_cmp(&b.1)) {
+            Some(found) if found.1 > best.1 => best = found,
+            _ => break,
+        }
+    }
+    let knob = Knob {
+        setting: 0,
+        value: 0,
+        slope: false,
+        step: step_s,
+    };
+    Some(Fitted {
+        settings: vec![Setting::constant(setting.spec, [best.0 as f64 * step_s])],
+        knobs: vec![knob],
+        log_likelihood: best.1,
+        // Of all that are nearest to it.
+        standard_errors: vec![step_s / 12.0_f64.sqrt()],
+    })
+}
+
 /// The best size of an effect that jumps: trial sizes about its own, then ever closer ones until they are about as good.
 pub(crate) fn hunt(evidence: &Evidence<'_>, setting: &Setting, spread: f64) -> Option<Fitted> {
     /// Rounds at most, and log-likelihood that a round must gain, or lose on either side, for another one to follow.
     const MOST: usize = 10;
     const NOTHING: f64 = 0.5;
     const LITTLE: f64 = 2.0;
+    /// Rounds at least.
+    const LEAST: usize = 4;
     let at = |size: f64| -> Option<(f64, f64)> {
         let log_likelihood = evidence.likelihood(&[Setting::constant(setting.spec, [size])])?;
         Some((size, log_likelihood))
@@ -177,7 +216,7 @@ pub(crate) fn hunt(evidence: &Evidence<'_>, setting: &Setting, spread: f64) -> O
             }
         }
         spread *= 0.4;
-        if round + 1 >= rounds(setting) && best.1 - before < NOTHING && lost < LITTLE {
+        if round + 1 >= LEAST && best.1 - before < NOTHING && lost < LITTLE {
             break;
         }
     }
@@ -193,13 +232,4 @@ pub(crate) fn hunt(evidence: &Evidence<'_>, setting: &Setting, spread: f64) -> O
         log_likelihood: best.1,
         standard_errors: vec![spread.max(0.004 * best.0)],
     })
-}
-
-/// Rounds of a hunt at least.
-fn rounds(setting: &Setting) -> usize {
-    if setting.spec.name == "command-delay" {
-        2
-    } else {
-        4
-    }
 }

@@ -9,7 +9,7 @@ use super::catalogue::Variant;
 use super::evidence::{Assessment, Evidence, Knob};
 use super::leads::{By, Lead, price, trusted};
 use super::noise::{factor_again, is_noise};
-use super::refine::{Fitted, hunt, jumps, knobs, knobs_of, one_step, refine};
+use super::refine::{Fitted, hunt, hunt_delay, jumps, knobs, knobs_of, one_step, refine};
 use super::repeat::repeats;
 use crate::candidate::{OfRun, apart, filled};
 
@@ -169,9 +169,11 @@ pub(crate) fn pursue(
 }
 
 fn follow(evidence: &Evidence<'_>, variant: &Variant, setting: Setting, steps: usize) -> Option<Fitted> {
+    if setting.spec.name == "command-delay" {
+        return hunt_delay(evidence, &setting);
+    }
     if jumps(&setting) {
         let spread = match setting.spec.name {
-            "command-delay" => 0.032,
             "speed-step" => 5e-4,
             "sensor-reach" => 0.04,
             _ => 0.003,

@@ -1,6 +1,6 @@
 //! What a robot and the camera above it have written down.
 
-use sim::{Pose, Readings, Robot, RunRules, Step, Vec2, WheelSpeeds};
+use sim::{Model, Pose, Readings, Robot, RunRules, Step, Vec2, WheelSpeeds};
 
 /// One control step of a run's file.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -13,6 +13,8 @@ pub struct LogRow {
     pub readings: Readings,
     /// The wheel speeds that it commanded, m/s; NaN where they are missing.
     pub command: WheelSpeeds,
+    /// Standard deviation of what a wheel is commanded to go in the step, m, where that was not logged; 0 where it was.
+    pub doubt_m: f64,
 }
 
 impl From<Step> for LogRow {
@@ -22,11 +24,23 @@ impl From<Step> for LogRow {
             observed: Some(step.observed),
             readings: step.readings,
             command: step.command,
+            doubt_m: 0.0,
         }
     }
 }
 
 impl LogRow {
+    /// A control step of which nothing was logged.
+    fn empty(time_s: f64) -> Self {
+        Self {
+            time_s,
+            observed: None,
+            readings: [f64::NAN; 8],
+            command: UNKNOWN,
+            doubt_m: 0.0,
+        }
+    }
+
     /// Whether it has readings and the command that followed them.
     pub fn tells(&self) -> bool {
         self.commands() && self.read().is_some()
@@ -51,16 +65,78 @@ pub(crate) fn without_logs(rows: &[LogRow], where_not: &[usize]) -> Vec<LogRow> 
     let mut rows = rows.to_vec();
     for &row in where_not {
         rows[row].readings = [f64::NAN; 8];
-        rows[row].command = WheelSpeeds {
-            left_m_s: f64::NAN,
-            right_m_s: f64::NAN,
-        };
+        rows[row].command = UNKNOWN;
     }
     rows
 }
 
+const UNKNOWN: WheelSpeeds = WheelSpeeds {
+    left_m_s: f64::NAN,
+    right_m_s: f64::NAN,
+};
+
+/// The rows of a run with those that are missing, where these are few in a row, and with commands where these are missing: on a
+/// line between those before and after, which may be off by as much as these differ.
+pub(crate) fn bridged(rows: &[LogRow], rules: &RunRules) -> Vec<LogRow> {
+    let mut whole: Vec<LogRow> = Vec::with_capacity(rows.len());
+    for row in rows {
+        if let Some(before) = whole.last().map(|before| before.time_s) {
+            let steps = ((row.time_s - before) / rules.control_step_s).round();
+            if (2.0..=BRIDGED as f64 + 1.0).contains(&steps) {
+                let time_s = |missing: u32| before + f64::from(missing) * (row.time_s - before) / steps;
+                whole.extend((1..steps as u32).map(|missing| LogRow::empty(time_s(missing))));
+            }
+        }
+        whole.push(*row);
+    }
+    let mut known = None;
+    for row in 0..whole.len() {
+        if !whole[row].commands() {
+            continue;
+        }
+        if let Some(before) = known.filter(|before| (2..=BRIDGED + 1).contains(&(row - before))) {
+            bridge(&mut whole[before..=row], rules);
+        }
+        known = Some(row);
+    }
+    whole
+}
+
+/// Commands between the first and the last of some rows.
+fn bridge(rows: &mut [LogRow], rules: &RunRules) {
+    /// What a command may be off where those beside it are alike, m/s.
+    const LEAST_M_S: f64 = 1e-3;
+    let last = rows.len() - 1;
+    let (from, to) = (rows[0].command, rows[last].command);
+    let leap_m_s = (to.left_m_s - from.left_m_s)
+        .abs()
+        .max((to.right_m_s - from.right_m_s).abs());
+    for (place, row) in rows.iter_mut().enumerate().take(last).skip(1) {
+        let share = place as f64 / last as f64;
+        let between = |from: f64, to: f64| from + share * (to - from);
+        row.command = WheelSpeeds {
+            left_m_s: between(from.left_m_s, to.left_m_s),
+            right_m_s: between(from.right_m_s, to.right_m_s),
+        };
+        row.doubt_m = rules.control_step_s * LEAST_M_S.max(0.5 * leap_m_s);
+    }
+}
+
+/// Control steps in a row that are bridged.
+const BRIDGED: usize = 3;
+
+/// Whether there is a stretch of these rows that a filter can follow.
+pub fn can_be_followed(rows: &[LogRow], model: &Model) -> bool {
+    let rows = bridged(rows, &model.run);
+    let robot = &model.machine.robot;
+    let mut found = stretches(&rows, &model.run).into_iter();
+    found.any(|rows| start_pose(rows, robot, &model.run).is_some())
+}
+
 /// Stretches of rows that follow each other without a gap and know their commands; the rest is left out.
 pub(crate) fn stretches<'a>(rows: &'a [LogRow], rules: &RunRules) -> Vec<&'a [LogRow]> {
+    /// Share of a control step that times may be off: clocks of logs jitter.
+    const OFF: f64 = 0.5;
     let mut found = Vec::new();
     let mut start = 0;
     for i in 0..=rows.len() {
@@ -68,7 +144,7 @@ pub(crate) fn stretches<'a>(rows: &'a [LogRow], rules: &RunRules) -> Vec<&'a [Lo
             || !rows[i].commands()
             || i > start
                 && (rows[i].time_s - rows[i - 1].time_s - rules.control_step_s).abs()
-                    > 0.25 * rules.control_step_s;
+                    > OFF * rules.control_step_s;
         if broken {
             if i - start >= SHORTEST {
                 found.push(&rows[start..i]);

@@ -98,6 +98,7 @@ mod tests {
                     observed: None,
                     readings,
                     command: WheelSpeeds::default(),
+                    doubt_m: 0.0,
                 }
             })
             .collect()
@@ -128,6 +129,7 @@ mod tests {
             observed: None,
             readings,
             command: WheelSpeeds::default(),
+            doubt_m: 0.0,
         };
         // Multiples of 146.27 as a file has them.
         let mut rows = vec![of([0.0, 146.3, 0.0, 146.3, 146.3, 146.3, 146.3, 146.3]); 200];
