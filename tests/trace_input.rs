@@ -186,13 +186,13 @@ fn values_that_no_robot_writes_are_taken_as_missing_and_said() {
     let spoilt = [
         (1000, 5, "99999", "ps2 is 99999, which this robot cannot write"),
         (1500, 5, "-50", "ps2 is -50, which this robot cannot write"),
+        (2500, 11, "5.0", "left_m_s is 5, which this robot cannot write"),
         (
             2000,
             7,
             "3000",
             "ps4 is 3000, far from what it is in the rows before and after",
         ),
-        (2500, 11, "5.0", "left_m_s is 5, which this robot cannot write"),
         (
             3000,
             12,

@@ -21,8 +21,8 @@ pub use laps::{
     Atlas, Baselines, FourNumbers, LapDiagnosis, ObservedLap, Quadratic, Rival, Simulate, Unseen, separations,
 };
 pub use log::{
-    Channel, Decided, Implausible, LogDiagnosis, LogRow, Why, can_be_followed, diagnose_logs, log_separation,
-    take_out_implausible,
+    Channel, Decided, Implausible, LogDiagnosis, LogRow, Spoilt, can_be_followed, diagnose_logs,
+    log_separation, take_out_implausible,
 };
 pub use mean_laps::{MeanLaps, mean_lap};
 pub use response_fit::{Estimate, ResponseFit};

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use diagnose::{Implausible, LogDiagnosis, LogRow, Why, can_be_followed, take_out_implausible};
+use diagnose::{Implausible, LogDiagnosis, LogRow, can_be_followed, take_out_implausible};
 use sim::{Model, Vec2, WheelSpeeds};
 
 use super::recording::Recording;
@@ -53,27 +53,20 @@ fn read(run: &RunFile, model: &Model) -> Option<(Vec<LogRow>, Vec<String>)> {
     };
     let mut rows: Vec<LogRow> = run.rows.since_start_s().enumerate().map(row).collect();
     let implausible = take_out_implausible(&mut rows, model);
-    Some((rows, implausible_in_words(run, &implausible)))
+    let why = "which this robot cannot write";
+    Some((rows, in_words(run, &implausible, why)))
 }
 
-/// Values of a log that are not used, in words: of a column and a reason together.
-fn implausible_in_words(run: &RunFile, found: &[Implausible]) -> Vec<String> {
-    let mut words = Vec::new();
-    for (column, name) in LOG_COLUMNS.into_iter().enumerate() {
-        for (reason, because) in [
-            (Why::OutOfRange, "which this robot cannot write"),
-            (Why::Spike, "far from what it is in the rows before and after"),
-        ] {
-            let of_both = found
-                .iter()
-                .filter(|one| (one.column, one.why) == (column, reason));
-            let values: BTreeMap<usize, f64> = of_both.map(|one| (one.row, one.value)).collect();
-            let rows: Vec<usize> = values.keys().copied().collect();
-            let what = |row: usize| format!("{name} is {}, {because}", short(values[&row]));
-            words.extend(run.tell(&rows, what, "taken as missing"));
-        }
-    }
-    words
+/// Values of a run's log that are not used, and why, in words: those of a column together.
+fn in_words(run: &RunFile, found: &[Implausible], why: &str) -> Vec<String> {
+    let of_column = |(column, name): (usize, &str)| {
+        let own = found.iter().filter(|one| one.column == column);
+        let values: BTreeMap<usize, f64> = own.map(|one| (one.row, one.value)).collect();
+        let rows: Vec<usize> = values.keys().copied().collect();
+        let what = |row: usize| format!("{name} is {}, {why}", short(values[&row]));
+        run.tell(&rows, what, "taken as missing")
+    };
+    LOG_COLUMNS.into_iter().enumerate().flat_map(of_column).collect()
 }
 
 /// What a reader must know of the logs that a diagnosis did not use, in words.
@@ -92,13 +85,18 @@ pub(super) fn unused_in_words(recording: &Recording, logs: &Logs, found: &LogDia
     words
 }
 
-/// The rows whose commands do not follow from their readings, in words.
+/// What of the logs was spoilt, in words.
 fn spoilt_in_words(recording: &Recording, found: &LogDiagnosis) -> Vec<String> {
-    let of_run = |(run, rows): (&RunFile, &Vec<usize>)| -> Vec<String> {
+    let runs = || recording.measured.set.runs.iter();
+    let leaping = |(run, readings): (&RunFile, &Vec<Implausible>)| {
+        in_words(run, readings, "far from what it is in the rows before and after")
+    };
+    let contradicting = |(run, rows): (&RunFile, &Vec<usize>)| {
         let what =
             |_| "the command does not follow from the readings as those of the other rows do".to_owned();
         run.tell(rows, what, "taken as missing")
     };
-    let runs = recording.measured.set.runs.iter().zip(&found.spoilt);
-    runs.flat_map(of_run).collect()
+    let readings = runs().zip(&found.spoilt.readings).flat_map(leaping);
+    let rows = runs().zip(&found.spoilt.rows).flat_map(contradicting);
+    readings.chain(rows).collect()
 }

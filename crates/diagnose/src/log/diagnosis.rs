@@ -9,6 +9,7 @@ use super::decide::{Decided, decision};
 use super::evidence::{Evidence, widened};
 use super::filter::MEASURED;
 use super::groups::unlisted_variants;
+use super::implausible::{Implausible, take_out_spikes};
 use super::recut::recut;
 use super::refined::Refined;
 use super::rows::{LogRow, bridged, without_logs};
@@ -29,9 +30,8 @@ pub struct LogDiagnosis {
     pub decide: Decided,
     /// Probability that as much is found in the logs of a robot that is as declared.
     pub p: f64,
-    /// Of each run, the rows whose commands do not follow from their readings as those of nearly all others do: they were not
-    /// used.
-    pub spoilt: Vec<Vec<usize>>,
+    /// What was not used.
+    pub spoilt: Spoilt,
     /// Camera x and y, then S0 to S7, under the best explanation.
     pub channels: [Channel; MEASURED],
     /// Where the walls seem to be cut.
@@ -40,6 +40,15 @@ pub struct LogDiagnosis {
     pub steps: usize,
     /// How large effects on motion, readings, walls and camera must be to show in these logs.
     pub detectable: Vec<Detectable>,
+}
+
+/// What of logs was spoilt after the robot had driven by it, run by run.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Spoilt {
+    /// The rows whose commands do not follow from their readings as those of nearly all others do.
+    pub rows: Vec<Vec<usize>>,
+    /// Readings that leap away for a few rows.
+    pub readings: Vec<Vec<Implausible>>,
 }
 
 /// What the robot's logs say that the model lacks. Runs are rows in time order, from the run's start; `watch` is told what is
@@ -57,9 +66,14 @@ pub fn diagnose_logs(
     watch("the controller");
     let decision = decision(model, runs);
     let (decide, spoilt) = (decision.decided, decision.spoilt);
-    let mended: Vec<Vec<LogRow>> = (runs.iter().zip(&spoilt))
-        .map(|(rows, spoilt)| bridged(&without_logs(rows, spoilt), &model.run))
+    let mut mended: Vec<Vec<LogRow>> = (runs.iter().zip(&spoilt))
+        .map(|(rows, spoilt)| without_logs(rows, spoilt))
         .collect();
+    let spoilt = Spoilt {
+        rows: spoilt,
+        readings: take_out_spikes(&mut mended),
+    };
+    let mended: Vec<Vec<LogRow>> = mended.iter().map(|rows| bridged(rows, &model.run)).collect();
     let runs: &[&[LogRow]] = &mended.iter().map(Vec::as_slice).collect::<Vec<_>>();
     let (wide, scene) = widened(model, scene)?;
     let step = reading_step(runs);
@@ -116,7 +130,7 @@ pub fn diagnose_logs(
 }
 
 impl Search<'_> {
-    fn answer(self, decide: Decided, spoilt: Vec<Vec<usize>>, corners: Corners) -> LogDiagnosis {
+    fn answer(self, decide: Decided, spoilt: Spoilt, corners: Corners) -> LogDiagnosis {
         let certain = self.certain(&decide);
         let is_certain = !certain.is_empty();
         let mut explanations: Vec<Explanation> = Vec::new();

@@ -14,29 +14,35 @@ pub struct Implausible {
     pub column: usize,
     /// In counts, or m/s.
     pub value: f64,
-    /// What is wrong with it.
-    pub why: Why,
 }
 
-/// Why a value is implausible.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Why {
-    /// No robot of the model writes it.
-    OutOfRange,
-    /// A reading that for a few rows is far from those of the same sensor before and after.
-    Spike,
-}
-
-/// Takes single values out of a run's log that its robot cannot have written, or that something spoilt, and says which: readings
-/// outside the sensors' range and commands beyond the wheels' limit, and readings that leap away for a few rows. None of a sort if
-/// there are many of it: that is another unit, or another robot, and no fault of single values.
+/// Takes single values out of a run's log that no robot of a model writes, and says which: readings outside the sensors' range
+/// and commands beyond the wheels' limit. None if there are many: that is another unit, or another robot.
 pub fn take_out_implausible(rows: &mut [LogRow], model: &Model) -> Vec<Implausible> {
-    let mut found = taken_out(rows, out_of_range(rows, model));
-    for sensor in 0..8 {
-        found.extend(taken_out(rows, spikes(rows, sensor)));
+    let found = out_of_range(rows, model);
+    taken_out(rows, found)
+}
+
+/// Takes readings that leap away for a few rows out of the logs of runs, and says which, run by run. Of the two sensors behind, that
+/// is: what spoils a reading of the others shows in a command that does not follow from it, and such rows have no readings any more
+/// here. What still leaps in these others was read by the robot, which then read what leaps behind it too.
+pub(crate) fn take_out_spikes(runs: &mut [Vec<LogRow>]) -> Vec<Vec<Implausible>> {
+    const BEHIND: [usize; 2] = [3, 4];
+    /// Leaps that may have been spoilt all the same, as a rule does not tell all sums apart.
+    const UNTOLD: usize = 2;
+    let leaps = |sensor: usize| runs.iter().map(|rows| spikes(rows, sensor).len()).sum::<usize>();
+    let read: usize = (0..8).filter(|sensor| !BEHIND.contains(sensor)).map(leaps).sum();
+    if read > UNTOLD {
+        return vec![Vec::new(); runs.len()];
     }
-    found.sort_by_key(|found| (found.row, found.column));
-    found
+    let of_run = |rows: &mut Vec<LogRow>| {
+        let of_sensor = |sensor| {
+            let found = spikes(rows, sensor);
+            taken_out(rows, found)
+        };
+        BEHIND.into_iter().flat_map(of_sensor).collect()
+    };
+    runs.iter_mut().map(of_run).collect()
 }
 
 /// Values are taken out if they are few.
@@ -63,7 +69,6 @@ fn out_of_range(rows: &[LogRow], model: &Model) -> Vec<Implausible> {
                     row,
                     column,
                     value: *value,
-                    why: Why::OutOfRange,
                 });
             }
         }
@@ -100,7 +105,6 @@ fn spikes(rows: &[LogRow], sensor: usize) -> Vec<Implausible> {
             row,
             column: sensor,
             value: reading(row),
-            why: Why::Spike,
         })
         .collect()
 }
@@ -175,11 +179,24 @@ mod tests {
                 row,
                 column: 4,
                 value: 3900.0,
-                why: Why::Spike,
             };
             assert_eq!(found, [1234, 1235, 1236].map(expected));
             assert!(log[1234].readings[4].is_nan() && log[1234].read().is_none());
         }
+    }
+
+    #[test]
+    fn what_the_robot_read_before_it_is_no_fault_of_the_file_behind_it() {
+        let spoil = |log: &mut Vec<LogRow>, sensor: usize, count: usize| {
+            (0..count).for_each(|i| log[50 + 123 * i].readings[sensor] = 3900.0);
+        };
+        let mut runs = [rows(10.0), rows(20.0)];
+        spoil(&mut runs[1], 3, 8);
+        let found = take_out_spikes(&mut runs.clone());
+        assert_eq!((found[0].len(), found[1].len()), (0, 8));
+        spoil(&mut runs[0], 6, 8);
+        let found = take_out_spikes(&mut runs);
+        assert_eq!(found, [[], []]);
     }
 
     #[test]

@@ -47,7 +47,7 @@ mod separation;
 
 pub use channels::Channel;
 pub use decide::Decided;
-pub use diagnosis::{LogDiagnosis, diagnose_logs};
-pub use implausible::{Implausible, Why, take_out_implausible};
+pub use diagnosis::{LogDiagnosis, Spoilt, diagnose_logs};
+pub use implausible::{Implausible, take_out_implausible};
 pub use rows::{LogRow, can_be_followed};
 pub use separation::log_separation;
