@@ -5,6 +5,7 @@
 mod case_study;
 mod cli;
 mod controls;
+mod damaged;
 mod declared;
 mod determinism;
 mod errors;

@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 use std::fs;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
@@ -209,4 +210,37 @@ pub(crate) fn never_a_listed_name(trace: &Value, stage: &str) {
     if verdict != "unexplained" {
         assert_eq!(said, (vec!["unlisted"], Some(stage)), "{trace:#}");
     }
+}
+
+/// Every row of a run's file, changed or left out.
+pub(crate) fn rewrite(
+    scratch: &Scratch,
+    run: &str,
+    change: impl Fn(usize, Vec<String>) -> Option<Vec<String>>,
+) {
+    let text = scratch.read(run);
+    let mut lines = text.lines();
+    let mut rewritten = lines.next().unwrap().to_owned() + "\n";
+    for (row, line) in lines.enumerate() {
+        let fields = line.split(',').map(str::to_owned).collect();
+        if let Some(fields) = change(row, fields) {
+            rewritten += &(fields.join(",") + "\n");
+        }
+    }
+    scratch.write(run, rewritten);
+}
+
+/// Every position, reading or time of a file in these columns, changed.
+pub(crate) fn with_columns(
+    scratch: &Scratch,
+    run: &str,
+    columns: Range<usize>,
+    change: impl Fn(f64) -> String,
+) {
+    rewrite(scratch, run, |_, mut fields| {
+        for field in &mut fields[columns.clone()] {
+            *field = change(field.parse().unwrap());
+        }
+        Some(fields)
+    });
 }

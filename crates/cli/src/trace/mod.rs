@@ -3,6 +3,7 @@
 mod answer;
 mod atlas;
 mod cache;
+mod checks;
 mod document;
 mod errors;
 mod limits;
@@ -95,6 +96,11 @@ impl Trace {
         let laps = observed_laps(&recordings)?;
         let logged = Logs::of(&recordings);
         let mut remarks = remarks(&recordings, logged.as_ref());
+        remarks.extend(
+            unseen
+                .iter()
+                .flat_map(|held_out| held_out.runs.iter().flat_map(SampledRun::remarks)),
+        );
         // Logs name the effect, and the laps judge it.
         let purpose = if logged.is_some() {
             Purpose::Judge
