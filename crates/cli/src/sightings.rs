@@ -1,5 +1,6 @@
 //! Where a camera saw the robot: sightings where it cannot be, and times in which it was not seen.
 
+use diagnose::{far, median};
 use track::Lap;
 
 use crate::dataset::{Rows, RunFile};
@@ -51,9 +52,6 @@ fn repeats(position_m: &[Option<[f64; 2]>]) -> Vec<usize> {
 fn outliers(position_m: &[Option<[f64; 2]>]) -> Vec<usize> {
     /// Sightings to either side of which the median is taken.
     const REACH: usize = 4;
-    /// Share of the sightings that tell how far they are off as a rule, and how many times as far is far.
-    const TAIL: f64 = 0.02;
-    const TIMES: f64 = 6.0;
     /// What is not far in any case, m.
     const LEAST_M: f64 = 0.008;
     /// Share of the sightings that are many: a camera that often errs is one of its own kind.
@@ -64,23 +62,12 @@ fn outliers(position_m: &[Option<[f64; 2]>]) -> Vec<usize> {
     let off_m = |at: usize| {
         // As many on one side as on the other: the robot moves.
         let reach = REACH.min(at).min(seen.len() - 1 - at);
-        let middle = |axis: usize| {
-            let mut about: Vec<f64> = seen[at - reach..=at + reach]
-                .iter()
-                .map(|(_, p)| p[axis])
-                .collect();
-            *about.select_nth_unstable_by(reach, f64::total_cmp).1
-        };
+        let about = &seen[at - reach..=at + reach];
+        let middle = |axis: usize| median(about.iter().map(|(_, p)| p[axis]));
         (seen[at].1[0] - middle(0)).hypot(seen[at].1[1] - middle(1))
     };
     let all_m: Vec<f64> = (0..seen.len()).map(off_m).collect();
-    if all_m.is_empty() {
-        return Vec::new();
-    }
-    let mut sorted = all_m.clone();
-    let rank = (TAIL * sorted.len() as f64) as usize;
-    let usual_m = *sorted.select_nth_unstable_by(rank, |a, b| b.total_cmp(a)).1;
-    let far_m = LEAST_M.max(TIMES * usual_m);
+    let far_m = far(&all_m, LEAST_M);
     let far = seen.iter().zip(&all_m).filter(|(_, off_m)| **off_m > far_m);
     let rows: Vec<usize> = far.map(|((row, _), _)| *row).collect();
     if rows.len() as f64 > MANY * seen.len() as f64 {
@@ -171,16 +158,11 @@ pub(crate) struct Hole {
 pub(crate) fn long_holes(run: &RunFile, whole: &[Lap]) -> Vec<Hole> {
     /// Of a lap's time.
     const LONGEST: f64 = 0.05;
-    let mut durations_s: Vec<f64> = whole
-        .iter()
-        .map(Lap::duration_s)
-        .filter(|s| s.is_finite())
-        .collect();
-    if durations_s.is_empty() {
+    let known_s = || whole.iter().map(Lap::duration_s).filter(|s| s.is_finite());
+    if known_s().next().is_none() {
         return Vec::new();
     }
-    let middle = durations_s.len() / 2;
-    let longest_s = LONGEST * *durations_s.select_nth_unstable_by(middle, f64::total_cmp).1;
+    let longest_s = LONGEST * median(known_s());
     let times_s: Vec<f64> = run.rows.since_start_s().collect();
     let seen: Vec<usize> = (0..times_s.len())
         .filter(|&row| run.rows.position_m[row].is_some())

@@ -9,6 +9,7 @@ mod laps;
 mod least_squares;
 mod log;
 mod mean_laps;
+mod outlying;
 mod response_fit;
 mod slip;
 
@@ -25,6 +26,7 @@ pub use log::{
     log_separation, take_out_implausible,
 };
 pub use mean_laps::{MeanLaps, mean_lap};
+pub use outlying::{far, median};
 pub use response_fit::{Estimate, ResponseFit};
 
 /// Is told what is being tried, in words for a reader who waits.

@@ -1,6 +1,7 @@
 //! Whether data are the model's, and in its units.
 
 use anyhow::{Context, Result, ensure};
+use diagnose::median;
 
 use crate::config::Config;
 use crate::dataset::{DataSet, RunFile};
@@ -29,12 +30,10 @@ pub(super) fn in_seconds(measured: &Measured, setup: &Setup) -> Result<()> {
 pub(super) fn in_control_steps(run: &RunFile, step_s: f64) -> Result<()> {
     /// Share by which a step may be off.
     const OFF: f64 = 0.25;
-    let mut apart_s: Vec<f64> = run.rows.t_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    if apart_s.is_empty() {
+    if run.rows.t_s.len() < 2 {
         return Ok(());
     }
-    let middle = apart_s.len() / 2;
-    let usual_s = *apart_s.select_nth_unstable_by(middle, f64::total_cmp).1;
+    let usual_s = median(run.rows.t_s.windows(2).map(|pair| pair[1] - pair[0]));
     let longest_s = match run.rows.log {
         Some(_) => step_s * (1.0 + OFF),
         None => f64::INFINITY,

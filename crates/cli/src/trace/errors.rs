@@ -68,25 +68,23 @@ struct Judged<'a> {
 impl Judged<'_> {
     /// The errors on runs that no fit has seen, each seen through its own holes.
     fn held_out(&self, held_out: HeldOut) -> Result<Errors> {
-        let simulated = |effects: &[Setting], unseen: Option<&Unseen>| {
-            let mut places = self.recording.places(effects);
-            places
-                .iter_mut()
-                .for_each(|place| place.unseen = unseen.filter(|unseen| !unseen.is_nothing()));
-            self.mean_laps(effects, &places)
+        let simulated = |unseen: Option<&Unseen>| {
+            self.before_and_after(|effects| {
+                let mut places = self.recording.places(effects);
+                places.iter_mut().for_each(|place| place.unseen = unseen);
+                self.mean_laps(effects, &places)
+            })
         };
-        let settings = self.answer.settings();
-        let mut errors = self.nothing_yet(simulated(&[], None)?, simulated(&settings, None)?);
-        for (run, unseen) in held_out.runs.into_iter().zip(&held_out.unseen) {
-            if unseen.is_nothing() {
-                let (before, after) = (errors.before.clone(), errors.after.clone());
-                errors.push(run, &before, &after, &after);
-            } else {
-                let after = simulated(&settings, Some(unseen))?;
-                errors.push(run, &simulated(&[], Some(unseen))?, &after, &after);
-            }
+        let all = simulated(None)?;
+        let mut distances_m = Vec::new();
+        for (run, unseen) in held_out.runs.iter().zip(&held_out.unseen) {
+            let own = (!unseen.is_nothing())
+                .then(|| simulated(Some(unseen)))
+                .transpose()?;
+            let [before, after] = own.as_ref().unwrap_or(&all);
+            distances_m.push(distances(run, before, after, after));
         }
-        Ok(errors)
+        Ok(self.errors(all, held_out.runs, &distances_m))
     }
 
     /// The errors on each measured run, of sizes that were fitted to the others.
@@ -96,18 +94,13 @@ impl Judged<'_> {
             self.mean_laps(effects, &recording.places(effects)[runs])
         };
         let runs = &recording.measured.runs;
-        let settings = self.answer.settings();
-        let before = simulated(&[], 0..runs.len())?;
-        let after = if settings.is_empty() {
-            before.clone()
-        } else {
-            simulated(&settings, 0..runs.len())?
-        };
-        let mut errors = self.nothing_yet(before.clone(), after.clone());
+        let all = self.before_and_after(|effects| simulated(effects, 0..runs.len()))?;
+        let [before, after] = &all;
+        let mut distances_m = Vec::new();
         for (at, run) in runs.iter().enumerate() {
             let alone = |effects| anyhow::Ok(Cow::Owned(simulated(effects, at..at + 1)?));
             let own_before = if recording.expects_the_same_of_runs() {
-                Cow::Borrowed(&before)
+                Cow::Borrowed(before)
             } else {
                 alone(&[])?
             };
@@ -117,10 +110,22 @@ impl Judged<'_> {
             } else {
                 alone(without)?
             };
-            let of_chance = if recording.has_holes() { &own_after } else { &after };
-            errors.push(run.clone(), &own_before, &own_after, of_chance);
+            let of_chance = if recording.has_holes() { &own_after } else { after };
+            distances_m.push(distances(run, &own_before, &own_after, of_chance));
         }
-        Ok(errors)
+        Ok(self.errors(all, runs.clone(), &distances_m))
+    }
+
+    /// The mean laps of the declared model and of that with the answer's effects, if it has any.
+    fn before_and_after(&self, simulated: impl Fn(&[Setting]) -> Result<MeanLaps>) -> Result<[MeanLaps; 2]> {
+        let before = simulated(&[])?;
+        let settings = self.answer.settings();
+        let after = if settings.is_empty() {
+            before.clone()
+        } else {
+            simulated(&settings)?
+        };
+        Ok([before, after])
     }
 
     fn mean_laps(&self, effects: &[Setting], places: &[RunPlace<'_>]) -> Result<MeanLaps> {
@@ -128,27 +133,33 @@ impl Judged<'_> {
         mean_laps(&self.recording.setup, effects, self.seed, longest, places)
     }
 
-    fn nothing_yet(&self, before: MeanLaps, after: MeanLaps) -> Errors {
+    fn errors(
+        &self,
+        [before, after]: [MeanLaps; 2],
+        held_out: Vec<SampledRun>,
+        distances_m: &[[f64; 3]],
+    ) -> Errors {
+        let of = |which: usize| distances_m.iter().map(|run| run[which]).collect();
         Errors {
             recording: self.place,
-            held_out: Vec::new(),
+            held_out,
             before,
             after,
-            before_m: Vec::new(),
-            after_m: Vec::new(),
-            floor_m: Vec::new(),
+            before_m: of(0),
+            after_m: of(1),
+            floor_m: of(2),
         }
     }
 }
 
-impl Errors {
-    /// One more run, with the simulations that it is held against, and those that tell what chance does.
-    fn push(&mut self, run: SampledRun, before: &MeanLaps, after: &MeanLaps, of_chance: &MeanLaps) {
-        self.before_m.push(before.distance_m(&run.offsets_m()));
-        self.after_m.push(after.distance_m(&run.offsets_m()));
-        self.floor_m.push(of_chance.floor_m(run.laps.len()));
-        self.held_out.push(run);
-    }
+/// How far a run is from the simulations before and after, and from others of the latter by chance, m.
+fn distances(run: &SampledRun, before: &MeanLaps, after: &MeanLaps, of_chance: &MeanLaps) -> [f64; 3] {
+    let offsets_m = run.offsets_m();
+    [
+        before.distance_m(&offsets_m),
+        after.distance_m(&offsets_m),
+        of_chance.floor_m(run.laps.len()),
+    ]
 }
 
 /// The mean lap of a model with effects: of runs that take the places of some measured runs, of up to `longest` laps, in turn.

@@ -31,7 +31,7 @@ use limits::decide_in_words;
 use logs::{Logs, unused_in_words};
 use next::{Experiment, experiments};
 pub(crate) use pages::{digest, gates_csv, sections, summary};
-use recording::{Recording, Seeds, held_out, observed_laps, simulate_all};
+use recording::{HeldOut, Recording, Seeds, observed_laps, simulate_all};
 use remarks::remarks;
 
 use crate::config::{Config, ModelFile};
@@ -85,22 +85,21 @@ impl Trace {
         file: &ModelFile,
         world: Option<&Path>,
         sets: Vec<DataSet>,
-        unseen: Option<DataSet>,
+        held_out: Option<DataSet>,
         cache: &Cache,
     ) -> Result<Self> {
         let recordings = Recording::all(session, file, world, sets)?;
-        let unseen = unseen.map(|set| held_out(&recordings, file, set)).transpose()?;
+        let held_out = held_out
+            .map(|set| HeldOut::new(&recordings, file, set))
+            .transpose()?;
         let seed = session.seed();
         let simulate =
             |effects: &[Setting], set: u64| simulate_all(&recordings, effects, Seeds { session: seed, set });
         let laps = observed_laps(&recordings)?;
         let logged = Logs::of(&recordings);
         let mut remarks = remarks(&recordings, logged.as_ref());
-        remarks.extend(
-            unseen
-                .iter()
-                .flat_map(|held_out| held_out.runs.iter().flat_map(SampledRun::remarks)),
-        );
+        let held_out_runs = held_out.iter().flat_map(|held_out| &held_out.runs);
+        remarks.extend(held_out_runs.flat_map(SampledRun::remarks));
         // Logs name the effect, and the laps judge it.
         let purpose = if logged.is_some() {
             Purpose::Judge
@@ -123,7 +122,7 @@ impl Trace {
         let mut named = named?;
         named.answer = named.answer.unless_stalls(recordings[0].config.slip.level);
         progress.message("simulating the error before and after");
-        let errors = errors(&recordings, &named.answer, unseen, seed)?;
+        let errors = errors(&recordings, &named.answer, held_out, seed)?;
         interrupt::check()?;
         if let (Some(found), Some(logs)) = (&named.from_logs, &logged) {
             remarks.extend(unused_in_words(&recordings[logs.recording], logs, &found.logs));

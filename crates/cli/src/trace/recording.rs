@@ -272,29 +272,31 @@ pub(super) struct HeldOut {
     pub(super) unseen: Vec<Unseen>,
 }
 
-/// Runs that no fit has seen, on the circuit of a recording that declares the same.
-///
-/// # Errors
-/// Data of another world, controller or declaration.
-pub(super) fn held_out(recordings: &[Recording], file: &ModelFile, set: DataSet) -> Result<HeldOut> {
-    let config = set.declared_config(&file.config)?;
-    let shown = set.folder.display().to_string();
-    let place = recordings
-        .iter()
-        .position(|recording| recording.config == config)
-        .with_context(|| {
-            format!(
-                "{shown}: declares other settings ([declared], controller) than every --measured data set"
-            )
-        })?;
-    belongs(&set, &config, &recordings[place].world)?;
-    let Recording { measured, setup, .. } = &recordings[place];
-    let measured = Measured::on(set, measured.circuit.clone())?;
-    Ok(HeldOut {
-        recording: place,
-        unseen: unseen(&measured, setup.model.run.control_step_s),
-        runs: measured.runs,
-    })
+impl HeldOut {
+    /// The runs of a data set, on the circuit of a recording that declares the same.
+    ///
+    /// # Errors
+    /// Data of another world, controller or declaration.
+    pub(super) fn new(recordings: &[Recording], file: &ModelFile, set: DataSet) -> Result<Self> {
+        let config = set.declared_config(&file.config)?;
+        let shown = set.folder.display().to_string();
+        let place = recordings
+            .iter()
+            .position(|recording| recording.config == config)
+            .with_context(|| {
+                format!(
+                    "{shown}: declares other settings ([declared], controller) than every --measured data set"
+                )
+            })?;
+        belongs(&set, &config, &recordings[place].world)?;
+        let Recording { measured, setup, .. } = &recordings[place];
+        let measured = Measured::on(set, measured.circuit.clone())?;
+        Ok(Self {
+            recording: place,
+            unseen: unseen(&measured, setup.model.run.control_step_s),
+            runs: measured.runs,
+        })
+    }
 }
 
 /// Where in its laps the camera did not see the robot, run by run.

@@ -6,9 +6,12 @@ use sim::{Controller, Model};
 
 use super::rows::LogRow;
 use super::steps::written_counts;
+use crate::outlying::median;
 
 /// Largest error of a speed that is written with 5 decimals; its standard deviation is about half of that.
 pub(crate) const SPEED_ROUNDING_M_S: f64 = 6e-6;
+/// How near the wheels' limit a written command is at it, m/s.
+pub(crate) const AT_LIMIT_M_S: f64 = 2e-5;
 /// Share of the control steps that may miss by more, where a command was cut or a file was mended.
 pub(crate) const FORGIVEN: f64 = 2e-3;
 
@@ -114,7 +117,7 @@ fn written_m_s(choices: &[Choice]) -> f64 {
 }
 
 fn choices(model: &Model, rows: &[LogRow]) -> Vec<Choice> {
-    let limit_m_s = model.machine.robot.wheel_speed_limit_m_s - 2e-5;
+    let limit_m_s = model.machine.robot.wheel_speed_limit_m_s - AT_LIMIT_M_S;
     (rows.iter().enumerate().filter(|(_, logged)| logged.commands()))
         .filter_map(|(row, logged)| logged.read().map(|readings| (row, logged, readings)))
         .map(|(row, logged, s)| Choice {
@@ -144,15 +147,14 @@ fn near<F>(
     fit: impl Fn(&[Choice]) -> F,
     off: impl Fn(&F, &Choice) -> f64,
 ) -> Vec<Choice> {
-    /// Times what half of the choices are off, and what they may be off in any case.
+    /// Times what half of the choices are off, or a rounding.
     const FAR: f64 = 20.0;
-    const NEAR_M_S: f64 = SPEED_ROUNDING_M_S;
     const ROUNDS: usize = 5;
     let mut fitted = begin;
     let mut kept: Vec<Choice> = Vec::new();
     for _ in 0..ROUNDS {
         let offs: Vec<f64> = choices.iter().map(|choice| off(&fitted, choice)).collect();
-        let most = FAR * median(offs.iter().copied()).max(NEAR_M_S);
+        let most = FAR * median(offs.iter().copied()).max(SPEED_ROUNDING_M_S);
         let pairs = choices.iter().zip(&offs).filter(|(_, off)| **off <= most);
         let next: Vec<Choice> = pairs.map(|(choice, _)| *choice).collect();
         let same = next.len() == kept.len();
@@ -178,16 +180,6 @@ fn missed(run: &Run, near: &[Choice], is_missed: impl Fn(&Choice) -> bool) -> (f
     let kept: BTreeSet<usize> = near.iter().map(|choice| choice.row).collect();
     let rows = run.choices.iter().map(|choice| choice.row);
     (share(near), rows.filter(|row| !kept.contains(row)).collect())
-}
-
-/// The value that half of the others are below; 0 of none.
-pub(crate) fn median(values: impl Iterator<Item = f64>) -> f64 {
-    let mut values: Vec<f64> = values.collect();
-    if values.is_empty() {
-        return 0.0;
-    }
-    let middle = values.len() / 2;
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
 /// V and K by least squares: the mean of the speeds is V, half their difference V K (Sl - Sr).

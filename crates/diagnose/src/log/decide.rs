@@ -4,7 +4,9 @@ use std::collections::BTreeMap;
 
 use sim::{Controller, Model, Pattern, Setting, find};
 
-use super::controller::{Constants, FORGIVEN, Line, SPEED_ROUNDING_M_S, constants_by_run, most_missed};
+use super::controller::{
+    AT_LIMIT_M_S, Constants, FORGIVEN, Line, SPEED_ROUNDING_M_S, constants_by_run, most_missed,
+};
 use super::rows::LogRow;
 use crate::Candidate;
 use crate::candidate::{OfRun, filled};
@@ -92,7 +94,7 @@ fn changed(controller: &Controller, found: &[Option<Constants>]) -> Vec<Candidat
 
 /// Share of the commands beyond the wheels' limit, to which every controller's commands are cut.
 fn beyond_limit(model: &Model, runs: &[&[LogRow]]) -> f64 {
-    let limit_m_s = model.machine.robot.wheel_speed_limit_m_s + 2e-5;
+    let limit_m_s = model.machine.robot.wheel_speed_limit_m_s + AT_LIMIT_M_S;
     let commanded = runs
         .iter()
         .flat_map(|rows| rows.iter())

@@ -316,9 +316,7 @@ fn step(
         for j in 0..3 {
             covariance[i][j] += motion.covariance[i][j];
         }
-        if row.doubt_m > 0.0 {
-            covariance[i][i] += doubt[i];
-        }
+        covariance[i][i] += doubt[i];
     }
     (instant.moved_to, instant.turned) = (motion.pose, motion.turned);
     if let Some(memory) = &mut state.memory {

@@ -2,8 +2,9 @@
 
 use sim::Model;
 
-use super::controller::median;
+use super::controller::AT_LIMIT_M_S;
 use super::rows::LogRow;
+use crate::outlying::{far, median};
 
 /// A value that was taken out of a log.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -53,7 +54,15 @@ fn taken_out(rows: &mut [LogRow], found: Vec<Implausible>) -> Vec<Implausible> {
         return Vec::new();
     }
     for Implausible { row, column, .. } in &found {
-        *values(&mut rows[*row])[*column] = f64::NAN;
+        let LogRow {
+            readings, command, ..
+        } = &mut rows[*row];
+        let value = match column {
+            8 => &mut command.left_m_s,
+            9 => &mut command.right_m_s,
+            sensor => &mut readings[*sensor],
+        };
+        *value = f64::NAN;
     }
     found
 }
@@ -62,14 +71,13 @@ fn out_of_range(rows: &[LogRow], model: &Model) -> Vec<Implausible> {
     let bounds = bounds(model);
     let mut found = Vec::new();
     for (row, logged) in rows.iter().enumerate() {
-        for (column, (value, [low, high])) in values(&mut logged.clone()).into_iter().zip(bounds).enumerate()
-        {
-            if *value < low || *value > high {
-                found.push(Implausible {
-                    row,
-                    column,
-                    value: *value,
-                });
+        let LogRow {
+            readings, command, ..
+        } = logged;
+        let values = readings.iter().chain([&command.left_m_s, &command.right_m_s]);
+        for (column, (&value, [low, high])) in values.zip(bounds).enumerate() {
+            if value < low || value > high {
+                found.push(Implausible { row, column, value });
             }
         }
     }
@@ -80,9 +88,6 @@ fn out_of_range(rows: &[LogRow], model: &Model) -> Vec<Implausible> {
 fn spikes(rows: &[LogRow], sensor: usize) -> Vec<Implausible> {
     /// Rows to either side of which the median is taken: what lasts no longer is a spike.
     const REACH: usize = 4;
-    /// Share of the rows that tell how far noise and edges go, and how many times as far a spike leaps.
-    const TAIL: f64 = 0.02;
-    const TIMES: f64 = 6.0;
     /// What is no spike in any case, counts.
     const LEAST_COUNTS: f64 = 200.0;
     let reading = |row: usize| rows[row].readings[sensor];
@@ -92,13 +97,7 @@ fn spikes(rows: &[LogRow], sensor: usize) -> Vec<Implausible> {
         (reading(places[at]) - median(about.map(|at| reading(places[at])))).abs()
     };
     let leaps: Vec<f64> = (0..places.len()).map(leap).collect();
-    if leaps.is_empty() {
-        return Vec::new();
-    }
-    let mut sorted = leaps.clone();
-    let rank = (TAIL * sorted.len() as f64) as usize;
-    let usual = *sorted.select_nth_unstable_by(rank, |a, b| b.total_cmp(a)).1;
-    let far = LEAST_COUNTS.max(TIMES * usual);
+    let far = far(&leaps, LEAST_COUNTS);
     (places.iter().zip(leaps))
         .filter(|(_, leap)| *leap > far)
         .map(|(&row, _)| Implausible {
@@ -114,30 +113,12 @@ fn bounds(model: &Model) -> [[f64; 2]; 10] {
     /// Readings that are rounded, by the robot or by the file, may lie a little outside their range, counts and share.
     const BELOW_COUNTS: f64 = 0.1;
     const BEYOND: f64 = 1.25;
-    const SPEED_ROUNDING_M_S: f64 = 2e-5;
     let machine = &model.machine;
-    let limit_m_s = machine.robot.wheel_speed_limit_m_s + SPEED_ROUNDING_M_S;
+    let limit_m_s = machine.robot.wheel_speed_limit_m_s + AT_LIMIT_M_S;
     std::array::from_fn(|column| match column {
         0..8 => [-BELOW_COUNTS, BEYOND * machine.full_scale_counts],
         _ => [-limit_m_s, limit_m_s],
     })
-}
-
-fn values(row: &mut LogRow) -> [&mut f64; 10] {
-    let [a, b, c, d, e, f, g, h] = &mut row.readings;
-    let command = &mut row.command;
-    [
-        a,
-        b,
-        c,
-        d,
-        e,
-        f,
-        g,
-        h,
-        &mut command.left_m_s,
-        &mut command.right_m_s,
-    ]
 }
 
 #[cfg(test)]

@@ -1,5 +1,7 @@
 //! The values of a candidate that explain the logs best.
 
+use std::collections::BTreeMap;
+
 use nalgebra::{DMatrix, DVector};
 use sim::{Pattern, Setting};
 
@@ -158,15 +160,19 @@ pub(crate) fn hunt_delay(evidence: &Evidence<'_>, setting: &Setting) -> Option<F
     let (Pattern::Constant(values), param) = (&setting.pattern, &setting.spec.params[0]) else {
         return None;
     };
-    let at = |steps: i64| -> Option<(i64, f64)> {
+    let mut known: BTreeMap<i64, Option<f64>> = BTreeMap::new();
+    let mut at = |steps: i64| -> Option<(i64, f64)> {
         let delay_s = (steps as f64 * step_s).clamp(param.low, param.high);
-        let log_likelihood = evidence.likelihood(&[Setting::constant(setting.spec, [delay_s])])?;
-        Some((steps, log_likelihood))
+        let likelihood = || evidence.likelihood(&[Setting::constant(setting.spec, [delay_s])]);
+        known
+            .entry(steps)
+            .or_insert_with(likelihood)
+            .map(|likelihood| (steps, likelihood))
     };
     let mut best = at((values[0] / step_s).round() as i64)?;
     loop {
         let about = [-2, -1, 1, 2].map(|by| best.0 + by);
-        let tried = about.into_iter().filter(|steps| *steps >= 0).filter_map(at);
+        let tried = about.into_iter().filter(|steps| *steps >= 0).filter_map(&mut at);
         match tried.max_by(|a, b| a.1.total_cmp(&b.1)) {
             Some(found) if found.1 > best.1 => best = found,
             _ => break,
