@@ -11,7 +11,7 @@ use track::{Lap, LapTracker, Way};
 use crate::config::Config;
 use crate::dataset::{DataSet, RunFile};
 use crate::setup;
-use crate::sightings::{long_holes, lost_in_words, without_strays};
+use crate::sightings::{lost, without_strays};
 
 /// The laps of one run that are analysed, and what was set aside.
 #[derive(Debug, Clone)]
@@ -196,9 +196,7 @@ fn sample(set: &DataSet, run: &RunFile, circuit: &Circuit, way: Way) -> Result<S
     let whole: Vec<Lap> = seen(run)
         .filter_map(|(time_s, position)| tracker.push(time_s, position))
         .collect();
-    let holes = long_holes(run, &whole);
-    let lost = |number: usize| lost_in_words(run, &holes, &whole, number);
-    let sampled = SampledRun::new(&set.name, &run.name, &whole, set.laps, lost);
+    let sampled = SampledRun::new(&set.name, &run.name, &whole, set.laps, lost(run, &whole));
     if sampled.laps.is_empty() {
         let path = run.path.display();
         if seen(run).next().is_none() {

@@ -11,6 +11,7 @@ mod log;
 mod mean_laps;
 mod outlying;
 mod response_fit;
+mod sightings;
 mod slip;
 
 pub use answer::{Answer, Cause, Explanation, Verdict};
@@ -28,6 +29,9 @@ pub use log::{
 pub use mean_laps::{MeanLaps, mean_lap};
 pub use outlying::{far, median};
 pub use response_fit::{Estimate, ResponseFit};
+pub use sightings::{
+    Hole, coarse_unit_m, hole_in, long_holes, outlying_sightings, repeated_sightings, stray_sightings,
+};
 
 /// Is told what is being tried, in words for a reader who waits.
 pub type Watch<'a> = dyn Fn(&str) + Sync + 'a;

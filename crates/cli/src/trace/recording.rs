@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use anyhow::{Context, Result, ensure};
-use diagnose::{ObservedLap, Unseen};
+use diagnose::{ObservedLap, Unseen, coarse_unit_m};
 use sim::{Setting, Start, Step, Streams};
 use track::Lap;
 
@@ -82,7 +82,12 @@ impl Recording {
             .for_each(|remark| session.remark(&remark));
         let mut setup =
             Setup::new(&config, circuit, None).map_err(|error| setup::locate(file, &source, error))?;
-        let written_m = written_m(&measured.set.runs);
+        let positions = measured
+            .set
+            .runs
+            .iter()
+            .flat_map(|run| run.rows.position_m.iter().flatten());
+        let written_m = coarse_unit_m(positions.flatten().copied());
         if let Some(unit_m) = written_m {
             let noise_m = &mut setup.model.machine.camera_noise_m;
             *noise_m = noise_m.hypot(unit_m / 12.0_f64.sqrt());
@@ -306,19 +311,6 @@ fn unseen(measured: &Measured, step_s: f64) -> Vec<Unseen> {
         Unseen::of(&run.laps, &seen_s, step_s)
     };
     measured.runs.iter().enumerate().map(of_run).collect()
-}
-
-/// What the positions of some runs are multiples of, m, if that is coarse.
-fn written_m(runs: &[RunFile]) -> Option<f64> {
-    const COARSE_M: [f64; 3] = [0.01, 0.005, 0.001];
-    let positions = || {
-        runs.iter()
-            .flat_map(|run| run.rows.position_m.iter().flatten().flatten())
-    };
-    let is_multiple = |x: f64| (x - x.round()).abs() < 1e-6;
-    COARSE_M
-        .into_iter()
-        .find(|unit| positions().all(|x| is_multiple(x / unit)))
 }
 
 /// Every run of all recordings.
