@@ -335,6 +335,51 @@ fn sets_with_different_declarations_are_traced_together() {
 }
 
 #[test]
+fn logs_of_sets_with_different_declarations_are_used_together() {
+    let scratch = Scratch::new();
+    let robot = limping().logged(&[3; 2]);
+    robot.record(&scratch, "set");
+    let reactive = Robot {
+        controller: Controller::Braitenberg {
+            speed_m_s: 0.05,
+            gain_per_count: 0.001,
+        },
+        declared: "controller.gain_per_count = 0.001",
+        ..robot.clone()
+    };
+    reactive.record(&scratch, "reactive");
+    few_laps(&[4]).record(&scratch, "seen");
+    let with = |more: &[&str]| {
+        let more: Vec<&str> = more.iter().flat_map(|set| ["--measured", set]).collect();
+        let found = trace(&scratch, "braitenberg", "set", &more);
+        says(&found, "explained", &["wheel-asymmetry"]);
+        holds(&found["effects"][0], "ratio", LIMPING, 1.0);
+        let steps = found["logs"]["control_steps"].as_u64().unwrap();
+        let [low, high] =
+            ["low", "high"].map(|key| found["effects"][0]["parameters"][0][key].as_f64().unwrap());
+        (steps, high - low, found["remarks"].clone())
+    };
+    let (alone, wide, _) = with(&[]);
+    let (together, narrow, remarks) = with(&["reactive", "seen"]);
+    assert!(
+        together > 19 * alone / 10 && narrow < 0.9 * wide,
+        "{together} {alone} {narrow} {wide}"
+    );
+    assert!(!remarks.to_string().contains("not used"), "{remarks}");
+
+    // Other walls are other rays.
+    let finer = Robot {
+        declared: "controller.gain_per_count = 0.001\nwall.max_error_m = 0.0049",
+        ..reactive
+    };
+    finer.record(&scratch, "finer");
+    let (steps, _, remarks) = with(&["finer"]);
+    assert_eq!(steps, alone);
+    let said = "The logs of finer (2 runs) are not used; they are declared with other walls, another body";
+    assert!(remarks.to_string().contains(said), "{remarks}");
+}
+
+#[test]
 fn the_error_is_that_of_the_set_that_is_held_out() {
     share_signatures("braitenberg");
     let scratch = Scratch::new();

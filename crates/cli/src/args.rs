@@ -291,8 +291,8 @@ pub(crate) struct Effects {
 pub(crate) struct Trace {
     #[command(flatten)]
     pub(crate) model: ModelArgs,
-    /// Measured data set; more than one, which may be declared otherwise, are traced together. Of logs, those of the
-    /// first one that has them for every run are used
+    /// Measured data set; more than one, which may be declared otherwise, are traced together. Logs are used of those that
+    /// have one for every run
     #[arg(long, required = true, value_name = "DIR")]
     pub(crate) measured: Vec<PathBuf>,
     /// Data set that no fit sees, to measure the error on [default: each run is left out of the fit in turn]

@@ -1,10 +1,7 @@
 //! What a diagnosis says in the end, from laps or from logs.
 
-use std::ops::Range;
-
 use sim::{Pattern, Setting, Stage, UNLISTED};
 
-use crate::candidate::spread_over;
 use crate::laps::SIGNIFICANT_P;
 use crate::{Candidate, FourNumbers};
 
@@ -203,24 +200,6 @@ impl Answer {
         self.verdict == Verdict::Unexplained || after.is_some_and(agree)
     }
 
-    /// Makes an answer that was found from some of the runs, `seen` among so many, one for all: a size by run is the mean of the seen
-    /// runs' where none was fitted, with an error that holds how far these are apart, and runs that no fit saw have nothing to be left out.
-    pub fn spread_over(&mut self, seen: &Range<usize>, runs: usize) {
-        if seen.len() == runs {
-            return;
-        }
-        let candidates = self.explanations.iter_mut().flat_map(|e| &mut e.effects);
-        candidates.for_each(|candidate| candidate.spread_over(seen, runs));
-        let whole = self.settings();
-        let own = std::mem::replace(&mut self.left_out, vec![whole; runs]);
-        for (run, mut settings) in seen.clone().zip(own) {
-            settings
-                .iter_mut()
-                .for_each(|setting| spread_over(setting, seen, runs));
-            self.left_out[run] = settings;
-        }
-    }
-
     /// This answer, unless it, or another that the data do not tell from it, is a slower wheel and more slip whose sizes
     /// follow from one another, as they do if wheels stand still in a share of the physics steps: one cause without a name,
     /// then, rather than two with theirs; so is noise without a name. `slip_level` is the declared model's.
@@ -301,28 +280,6 @@ mod tests {
             left_out: Vec::new(),
             cause: None,
         }
-    }
-
-    #[test]
-    fn runs_that_no_fit_saw_have_the_mean_size_and_nothing_left_out() {
-        let gain = |values: &[f64]| Setting {
-            spec: find("reading-gain").unwrap(),
-            pattern: Pattern::ByRun(values.iter().map(|value| vec![*value]).collect()),
-        };
-        let mut found = answer(1.0, 1.0);
-        let effect = &mut found.explanations[0].effects[0];
-        (effect.setting, effect.standard_errors) = (gain(&[7.0, 13.0]), vec![4.0, 4.0]);
-        found.explanations[0].effects.truncate(1);
-        found.left_out = vec![vec![gain(&[13.0, 13.0])], vec![gain(&[7.0, 7.0])]];
-        found.spread_over(&(1..3), 4);
-        let effect = &found.explanations[0].effects[0];
-        let all = gain(&[10.0, 7.0, 13.0, 10.0]);
-        assert_eq!(effect.setting, all);
-        // 3 off the mean and known to 4.
-        assert_eq!(effect.standard_errors, [5.0, 4.0, 4.0, 5.0]);
-        let [low, high] = [7.0, 13.0].map(|value| gain(&[value; 4]));
-        let expected = [all.clone(), high, low, all].map(|setting| vec![setting]);
-        assert_eq!(found.left_out, expected);
     }
 
     #[test]

@@ -66,28 +66,6 @@ impl Candidate {
     pub fn label(&self) -> String {
         label(&self.setting)
     }
-
-    /// Gives a size by run that was fitted to the runs `seen` among so many to all of them.
-    pub(crate) fn spread_over(&mut self, seen: &Range<usize>, runs: usize) {
-        if let Pattern::ByRun(values) = &mut self.setting.pattern {
-            let errors = self.standard_errors.chunks(values[0].len()).map(<[f64]>::to_vec);
-            if let Some(all) = in_all_runs(values.iter().cloned().zip(errors), seen, runs) {
-                (*values, self.standard_errors) = all;
-            }
-        }
-    }
-}
-
-/// Gives a size by run of the runs `seen` among so many to all of them.
-pub(crate) fn spread_over(setting: &mut Setting, seen: &Range<usize>, runs: usize) {
-    if let Pattern::ByRun(values) = &mut setting.pattern {
-        let exact = values
-            .iter()
-            .map(|values| (values.clone(), vec![0.0; values.len()]));
-        if let Some((all, _)) = in_all_runs(exact, seen, runs) {
-            *values = all;
-        }
-    }
 }
 
 /// An effect with what tells it from others of its name, and its pattern.
@@ -165,15 +143,15 @@ pub(crate) fn stage_of(setting: &Setting) -> Stage {
     Cause::of(setting).map_or(setting.spec.stage, |cause| cause.stage)
 }
 
-/// Gives one run of several the mean of the other runs' values.
-pub(crate) fn take_mean_of_others(values: &mut [Vec<f64>], run: usize) {
-    let others = values.len() as f64 - 1.0;
-    if others < 1.0 || run >= values.len() {
+/// Gives one run the mean of the values of all others of these.
+pub(crate) fn take_mean_of_others(values: &mut [Vec<f64>], run: usize, of: impl Iterator<Item = usize>) {
+    let others: Vec<usize> = of.filter(|&other| other != run).collect();
+    if others.is_empty() || run >= values.len() {
         return;
     }
     for i in 0..values[run].len() {
-        let sum: f64 = values.iter().map(|values| values[i]).sum();
-        values[run][i] = (sum - values[run][i]) / others;
+        let sum: f64 = others.iter().map(|&other| values[other][i]).sum();
+        values[run][i] = sum / others.len() as f64;
     }
 }
 
@@ -206,19 +184,6 @@ pub(crate) fn filled(runs: &[Option<OfRun>]) -> Option<(Vec<Vec<f64>>, Vec<f64>)
     ))
 }
 
-/// What the runs `seen` among so many tell, values and errors, [`filled`] for all.
-fn in_all_runs(
-    told: impl Iterator<Item = (Vec<f64>, Vec<f64>)>,
-    seen: &Range<usize>,
-    runs: usize,
-) -> Option<(Vec<Vec<f64>>, Vec<f64>)> {
-    let mut all = vec![None; runs];
-    for (run, (values, errors)) in seen.clone().zip(told) {
-        all[run] = Some(OfRun { values, errors });
-    }
-    filled(&all)
-}
-
 #[cfg(test)]
 mod tests {
     use sim::find;
@@ -228,10 +193,12 @@ mod tests {
     #[test]
     fn a_run_takes_the_mean_of_the_others() {
         let mut values = vec![vec![1.0, 5.0], vec![9.0, 9.0], vec![3.0, 6.0]];
-        take_mean_of_others(&mut values, 1);
+        take_mean_of_others(&mut values, 1, 0..3);
         assert_eq!(values, [[1.0, 5.0], [2.0, 5.5], [3.0, 6.0]]);
+        take_mean_of_others(&mut values, 0, [0, 2].into_iter());
+        assert_eq!(values[0], [3.0, 6.0]);
         let mut alone = vec![vec![1.0]];
-        take_mean_of_others(&mut alone, 0);
+        take_mean_of_others(&mut alone, 0, 0..1);
         assert_eq!(alone, [[1.0]]);
     }
 

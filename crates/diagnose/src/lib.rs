@@ -23,7 +23,7 @@ pub use laps::{
     Atlas, Baselines, FourNumbers, LapDiagnosis, ObservedLap, Quadratic, Rival, Simulate, Unseen, separations,
 };
 pub use log::{
-    Channel, Decided, Implausible, LogDiagnosis, LogRow, Spoilt, can_be_followed, diagnose_logs,
+    Channel, Decided, Implausible, LogDiagnosis, LogRow, LoggedRun, Spoilt, can_be_followed, diagnose_logs,
     log_separation, take_out_implausible,
 };
 pub use mean_laps::{MeanLaps, mean_lap};

@@ -2,13 +2,12 @@
 
 use anyhow::{Context, Result};
 use diagnose::{
-    Answer, Atlas, Baselines, Detectable, Explanation, FourNumbers, LogDiagnosis, LogRow, ObservedLap,
+    Answer, Atlas, Baselines, Detectable, Explanation, FourNumbers, LogDiagnosis, LoggedRun, ObservedLap,
     Simulate, Verdict, Watch, diagnose_logs,
 };
 
 use super::logs::Logs;
 use super::recording::Recording;
-use crate::setup::Setup;
 
 /// An answer from logs beside what the laps make of it.
 #[derive(Debug)]
@@ -49,20 +48,22 @@ impl TracedLaps<'_> {
         })
     }
 
-    /// What the logs of a recording say, stage by stage, and what the laps make of it.
+    /// What the robot's logs say, stage by stage, and what the laps make of it.
     pub(super) fn named_by_logs(
         &self,
-        recording: &Recording,
+        recordings: &[Recording],
         logs: &Logs,
         watch: &Watch<'_>,
     ) -> Result<Named> {
-        let runs: Vec<&[LogRow]> = logs.runs.iter().map(Vec::as_slice).collect();
-        let Setup { model, scene, .. } = &recording.setup;
-        let mut logs =
-            diagnose_logs(model, scene, &runs, watch).with_context(|| recording.measured.set.name.clone())?;
+        let models = (recordings.iter())
+            .flat_map(|recording| recording.measured.runs.iter().map(|_| &recording.setup.model));
+        let runs: Vec<LoggedRun<'_>> = (models.zip(&logs.runs))
+            .map(|(model, rows)| LoggedRun { model, rows })
+            .collect();
+        let first = &recordings[logs.recordings[0]];
+        let logs = diagnose_logs(&first.setup.scene, &runs, watch)
+            .with_context(|| first.measured.set.name.clone())?;
         watch("whether the laps agree");
-        let logged = recording.first_run..recording.first_run + runs.len();
-        logs.answer.spread_over(&logged, self.laps.len());
         let (before, after) = (self.atlas).confirm(self.simulate, self.laps, &logs.answer.settings())?;
         let found = FromLogs {
             confirmed: logs.answer.agrees_with(&before, after.as_ref()),

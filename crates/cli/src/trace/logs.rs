@@ -1,41 +1,61 @@
-//! The robot's logs, of a recording in which every run has one.
+//! The robot's logs, of the recordings in which every run has one.
 
 use std::collections::BTreeMap;
 
 use diagnose::{Implausible, LogDiagnosis, LogRow, can_be_followed, take_out_implausible};
 use sim::{Model, Vec2, WheelSpeeds};
 
-use super::recording::Recording;
+use super::recording::{Recording, files};
 use crate::dataset::{LOG_COLUMNS, RunFile};
 use crate::sightings::short;
 
-/// The logs of one recording.
+/// The logs that are used.
 #[derive(Debug)]
 pub(super) struct Logs {
-    /// The number of their recording.
-    pub(super) recording: usize,
-    /// The rows of every run.
+    /// The numbers of their recordings.
+    pub(super) recordings: Vec<usize>,
+    /// The rows of every run of all recordings, none where no log is used.
     pub(super) runs: Vec<Vec<LogRow>>,
     /// Values that are not used, in words.
     pub(super) implausible: Vec<String>,
 }
 
 impl Logs {
-    /// The logs of the first recording in which every run has one, and one at least can be followed.
+    /// The logs of the recordings in which every run has one, and one at least can be followed, between walls that are the same to the robot.
     pub(super) fn of(recordings: &[Recording]) -> Option<Self> {
-        (recordings.iter().enumerate()).find_map(|(place, recording)| {
-            let files = &recording.measured.set.runs;
-            let model = &recording.setup.model;
-            let runs: Vec<_> = files.iter().map(|run| read(run, model)).collect::<Option<_>>()?;
-            let (runs, implausible): (Vec<_>, Vec<_>) = runs.into_iter().unzip();
-            let followed = runs.iter().any(|rows| can_be_followed(rows, model));
-            followed.then(|| Self {
-                recording: place,
-                runs,
-                implausible: implausible.concat(),
-            })
-        })
+        let mut logs = Self {
+            recordings: Vec::new(),
+            runs: Vec::new(),
+            implausible: Vec::new(),
+        };
+        for (number, recording) in recordings.iter().enumerate() {
+            let first = logs
+                .recordings
+                .first()
+                .map_or(recording, |&first| &recordings[first]);
+            let runs = read_all(recording).filter(|_| recording.shares_walls_with(first));
+            match runs {
+                Some((runs, implausible)) => {
+                    logs.recordings.push(number);
+                    logs.runs.extend(runs);
+                    logs.implausible.extend(implausible);
+                }
+                None => logs.runs.extend(recording.shape().iter().map(|_| Vec::new())),
+            }
+        }
+        (!logs.recordings.is_empty()).then_some(logs)
     }
+}
+
+/// The rows of every run of a recording, and in words what of them is not used; `None` where a run has no log, or none can be
+/// followed.
+fn read_all(recording: &Recording) -> Option<(Vec<Vec<LogRow>>, Vec<String>)> {
+    let model = &recording.setup.model;
+    let runs = recording.measured.set.runs.iter();
+    let runs: Vec<_> = runs.map(|run| read(run, model)).collect::<Option<_>>()?;
+    let (runs, implausible): (Vec<_>, Vec<_>) = runs.into_iter().unzip();
+    let followed = runs.iter().any(|rows| can_be_followed(rows, model));
+    followed.then(|| (runs, implausible.concat()))
 }
 
 /// The rows of a run's log, and in words what of them is not used.
@@ -70,10 +90,10 @@ fn in_words(run: &RunFile, found: &[Implausible], why: &str) -> Vec<String> {
 }
 
 /// What a reader must know of the logs that a diagnosis did not use, in words.
-pub(super) fn unused_in_words(recording: &Recording, logs: &Logs, found: &LogDiagnosis) -> Vec<String> {
+pub(super) fn unused_in_words(recordings: &[Recording], logs: &Logs, found: &LogDiagnosis) -> Vec<String> {
     /// Share of the rows of which it is said if no more are used.
     const MOST: f64 = 0.9;
-    let mut words = spoilt_in_words(recording, found);
+    let mut words = spoilt_in_words(recordings, found);
     let rows: usize = logs.runs.iter().map(Vec::len).sum();
     if (found.steps as f64) < MOST * rows as f64 {
         words.push(format!(
@@ -86,8 +106,8 @@ pub(super) fn unused_in_words(recording: &Recording, logs: &Logs, found: &LogDia
 }
 
 /// What of the logs was spoilt, in words.
-fn spoilt_in_words(recording: &Recording, found: &LogDiagnosis) -> Vec<String> {
-    let runs = || recording.measured.set.runs.iter();
+fn spoilt_in_words(recordings: &[Recording], found: &LogDiagnosis) -> Vec<String> {
+    let runs = || files(recordings);
     let leaping = |(run, readings): (&RunFile, &Vec<Implausible>)| {
         in_words(run, readings, "far from what it is in the rows before and after")
     };

@@ -115,7 +115,7 @@ impl Trace {
             laps: &laps,
         };
         let named = match &logged {
-            Some(logs) => traced.named_by_logs(&recordings[logs.recording], logs, &watch),
+            Some(logs) => traced.named_by_logs(&recordings, logs, &watch),
             None => traced.named(&watch),
         };
         interrupt::check()?;
@@ -125,7 +125,7 @@ impl Trace {
         let errors = errors(&recordings, &named.answer, held_out, seed)?;
         interrupt::check()?;
         if let (Some(found), Some(logs)) = (&named.from_logs, &logged) {
-            remarks.extend(unused_in_words(&recordings[logs.recording], logs, &found.logs));
+            remarks.extend(unused_in_words(&recordings, logs, &found.logs));
             if matches!(found.logs.decide, Decided::NoController { .. }) {
                 remarks.push(decide_in_words(&found.logs.decide));
             }

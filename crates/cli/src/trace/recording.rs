@@ -130,6 +130,15 @@ impl Recording {
         self.measured.runs.iter().enumerate().map(observed).collect()
     }
 
+    /// Whether walls that were prepared for another one's model serve this one's: its walls are cut alike, and its body and the
+    /// places of its sensors are the same.
+    pub(super) fn shares_walls_with(&self, other: &Self) -> bool {
+        let [own, others] = [self, other].map(|recording| &recording.setup.model);
+        own.wall == others.wall
+            && own.machine.robot.body_radius_m == others.machine.robot.body_radius_m
+            && own.machine.mounts == others.machine.mounts
+    }
+
     /// Whether the declared model leads one to expect the same laps of every run, wherever the run starts.
     pub(super) fn expects_the_same_of_runs(&self) -> bool {
         self.runs_are_alike() && !self.has_holes()
@@ -316,6 +325,13 @@ fn unseen(measured: &Measured, step_s: f64) -> Vec<Unseen> {
 /// Every run of all recordings.
 pub(super) fn runs(recordings: &[Recording]) -> impl Iterator<Item = &SampledRun> {
     recordings.iter().flat_map(|recording| &recording.measured.runs)
+}
+
+/// The file of every run of all recordings.
+pub(super) fn files(recordings: &[Recording]) -> impl Iterator<Item = &RunFile> {
+    recordings
+        .iter()
+        .flat_map(|recording| &recording.measured.set.runs)
 }
 
 /// The laps of every run of all recordings.

@@ -47,8 +47,8 @@ pub(super) fn remarks(recordings: &[Recording], logged: Option<&Logs>) -> Vec<St
     }
     if let Some(logs) = logged {
         remarks.extend(logs.implausible.iter().cloned());
-        for (run, rows) in recordings[logs.recording].measured.runs.iter().zip(&logs.runs) {
-            if !rows.iter().any(LogRow::tells) {
+        for (run, rows) in runs(recordings).zip(&logs.runs) {
+            if !rows.is_empty() && !rows.iter().any(LogRow::tells) {
                 remarks.push(format!(
                     "The log of run {} has no readings beside commands: a size that goes by run is the mean of the other \
                      runs' there.",
@@ -57,17 +57,20 @@ pub(super) fn remarks(recordings: &[Recording], logged: Option<&Logs>) -> Vec<St
             }
         }
     }
-    let used = logged.map(|logs| logs.recording);
+    let used = logged.map_or(&[][..], |logs| &logs.recordings);
     for (place, recording) in recordings.iter().enumerate() {
         let set = &recording.measured.set;
         let count = set.runs.iter().filter(|run| run.rows.log.is_some()).count();
-        if used != Some(place) && count > 0 {
+        if !used.contains(&place) && count > 0 {
             let why = match used {
-                Some(_) => "those of another data set are used: trace this one alone to use them",
-                None if count < set.runs.len() => {
+                [first, ..] if !recording.shares_walls_with(&recordings[*first]) => {
+                    "they are declared with other walls, another body or other places of sensors than those that are: trace this data \
+                     set alone to use them"
+                }
+                _ if count < set.runs.len() => {
                     "a log in every run is needed: leave out the runs without one to use them"
                 }
-                None => {
+                _ => {
                     "a stretch of 200 rows is needed in which a row and its command are there for nearly every control step, and \
                      the camera saw the robot"
                 }

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use sim::{Controller, Model};
 
-use super::rows::LogRow;
+use super::rows::{LogRow, LoggedRun};
 use super::steps::written_counts;
 use crate::outlying::median;
 
@@ -29,6 +29,7 @@ struct Choice {
 /// What one run's log says of the controller.
 #[derive(Debug)]
 struct Run {
+    declared: Controller,
     choices: Vec<Choice>,
     /// What its readings are multiples of: 0.1 where they have one decimal.
     written_counts: f64,
@@ -37,9 +38,10 @@ struct Run {
 }
 
 impl Run {
-    fn new(model: &Model, rows: &[LogRow]) -> Self {
+    fn new(LoggedRun { model, rows }: &LoggedRun<'_>) -> Self {
         let choices = choices(model, rows);
         Self {
+            declared: model.machine.controller,
             written_m_s: written_m_s(&choices),
             written_counts: written_counts(rows),
             choices,
@@ -79,11 +81,11 @@ pub(crate) struct Constants {
 
 /// The constants by each run's log, changing in time only if they explain the logs in no other way; `None` where a log tells
 /// nothing.
-pub(crate) fn constants_by_run(model: &Model, runs: &[&[LogRow]]) -> Vec<Option<Constants>> {
-    let runs: Vec<Run> = runs.iter().map(|rows| Run::new(model, rows)).collect();
+pub(crate) fn constants_by_run(runs: &[LoggedRun<'_>]) -> Vec<Option<Constants>> {
+    let runs: Vec<Run> = runs.iter().map(Run::new).collect();
     let fit = |sloped: bool| -> Vec<Option<Constants>> {
         (runs.iter())
-            .map(|run| (!run.choices.is_empty()).then(|| constants(model, run, sloped)))
+            .map(|run| (!run.choices.is_empty()).then(|| constants(run, sloped)))
             .collect()
     };
     let still = fit(false);
@@ -132,8 +134,8 @@ fn choices(model: &Model, rows: &[LogRow]) -> Vec<Choice> {
         .collect()
 }
 
-fn constants(model: &Model, run: &Run, sloped: bool) -> Constants {
-    match model.machine.controller {
+fn constants(run: &Run, sloped: bool) -> Constants {
+    match run.declared {
         Controller::Braitenberg { .. } => braitenberg(run, sloped),
         Controller::RuleBased { threshold_counts, .. } => rules(run, threshold_counts, sloped),
     }
@@ -374,6 +376,15 @@ fn line(points: impl Iterator<Item = (f64, f64, f64)>, sloped: bool) -> Line {
 mod tests {
     use super::*;
 
+    const BRAITENBERG: Controller = Controller::Braitenberg {
+        speed_m_s: 0.06,
+        gain_per_count: 0.003,
+    };
+    const RULES: Controller = Controller::RuleBased {
+        speed_m_s: 0.05,
+        threshold_counts: 300.0,
+    };
+
     /// A step of a rule-based controller with threshold T on sums that are written to 0.1 counts.
     fn chosen(time_s: f64, right_counts: f64, threshold_counts: f64) -> Choice {
         const SPEED_M_S: f64 = 0.05;
@@ -407,6 +418,7 @@ mod tests {
             }
         };
         let run = Run {
+            declared: BRAITENBERG,
             choices: (0..6000).map(step).collect(),
             written_counts: 0.1,
             written_m_s: 1e-5,
@@ -434,6 +446,7 @@ mod tests {
             }
         };
         Run {
+            declared: BRAITENBERG,
             choices: (0..steps).map(step).collect(),
             written_counts: 0.1,
             written_m_s: 1e-5,
@@ -476,6 +489,7 @@ mod tests {
         choices[900].left_m_s = -0.05;
         choices[1700].right_m_s = 0.09;
         let run = Run {
+            declared: RULES,
             choices,
             written_counts: 0.1,
             written_m_s: 1e-5,
@@ -491,6 +505,7 @@ mod tests {
         const THRESHOLD: f64 = 410.02;
         let sums = [409.97, 410.03, 400.0, 420.0];
         let run = Run {
+            declared: RULES,
             choices: (sums.iter().enumerate())
                 .map(|(i, sum)| chosen(0.064 * i as f64, *sum, THRESHOLD))
                 .collect(),

@@ -2,12 +2,12 @@
 
 use std::collections::BTreeMap;
 
-use sim::{Controller, Model, Pattern, Setting, find};
+use sim::{Controller, Pattern, Setting, find};
 
 use super::controller::{
     AT_LIMIT_M_S, Constants, FORGIVEN, Line, SPEED_ROUNDING_M_S, constants_by_run, most_missed,
 };
-use super::rows::LogRow;
+use super::rows::LoggedRun;
 use crate::Candidate;
 use crate::candidate::{OfRun, filled};
 
@@ -39,9 +39,10 @@ pub(crate) struct Decision {
 }
 
 /// The verdict over all runs.
-pub(crate) fn decision(model: &Model, runs: &[&[LogRow]]) -> Decision {
-    let found = constants_by_run(model, runs);
-    let decided = decided(model, beyond_limit(model, runs), &found);
+pub(crate) fn decision(runs: &[LoggedRun<'_>]) -> Decision {
+    let found = constants_by_run(runs);
+    let declared: Vec<Controller> = runs.iter().map(|run| run.model.machine.controller).collect();
+    let decided = decided(&declared, beyond_limit(runs), &found);
     let holds = matches!(decided, Decided::AsDeclared | Decided::Changed(_));
     let spoilt = |run: Option<Constants>| run.filter(|_| holds).map_or_else(Vec::new, |run| run.spoilt);
     Decision {
@@ -50,8 +51,8 @@ pub(crate) fn decision(model: &Model, runs: &[&[LogRow]]) -> Decision {
     }
 }
 
-/// The verdict, if that share of the commands is beyond what wheels can do.
-fn decided(model: &Model, beyond: f64, found: &[Option<Constants>]) -> Decided {
+/// The verdict on runs whose declared controllers are these, if that share of the commands is beyond what wheels can do.
+fn decided(declared: &[Controller], beyond: f64, found: &[Option<Constants>]) -> Decided {
     if beyond > FORGIVEN {
         return Decided::NoController { share: beyond };
     }
@@ -62,7 +63,7 @@ fn decided(model: &Model, beyond: f64, found: &[Option<Constants>]) -> Decided {
     if share > FORGIVEN {
         return Decided::NoController { share };
     }
-    let changed = changed(&model.machine.controller, found);
+    let changed = changed(declared, found);
     let in_range = |candidate: &Candidate| candidate.setting.check(0).is_ok();
     match changed.is_empty() {
         true => Decided::AsDeclared,
@@ -73,37 +74,46 @@ fn decided(model: &Model, beyond: f64, found: &[Option<Constants>]) -> Decided {
 }
 
 /// The constants that are not the declared ones.
-fn changed(controller: &Controller, found: &[Option<Constants>]) -> Vec<Candidate> {
-    let parameter = match *controller {
-        Controller::Braitenberg { gain_per_count, .. } => gain_per_count,
-        Controller::RuleBased { threshold_counts, .. } => threshold_counts,
+fn changed(declared: &[Controller], found: &[Option<Constants>]) -> Vec<Candidate> {
+    let relative = |factor: fn(&Controller, &Constants) -> Relative| -> Vec<Option<Relative>> {
+        let of_run =
+            |(declared, run): (&Controller, &Option<Constants>)| Some(factor(declared, run.as_ref()?));
+        declared.iter().zip(found).map(of_run).collect()
     };
-    let speed = controller.speed_m_s();
-    let candidates = [
-        candidate("controller-gain", found, |run| Relative {
+    let gains = relative(|declared, run| {
+        let parameter = match *declared {
+            Controller::Braitenberg { gain_per_count, .. } => gain_per_count,
+            Controller::RuleBased { threshold_counts, .. } => threshold_counts,
+        };
+        Relative {
             line: run.parameter.map(|p| p / parameter),
             error: run.parameter_error / parameter,
-        }),
-        candidate("controller-speed", found, |run| Relative {
+        }
+    });
+    let speeds = relative(|declared, run| {
+        let speed = declared.speed_m_s();
+        Relative {
             line: run.speed_m_s.map(|v| v / speed),
             error: SPEED_ROUNDING_M_S / speed * 0.05,
-        }),
+        }
+    });
+    let candidates = [
+        candidate("controller-gain", &gains),
+        candidate("controller-speed", &speeds),
     ];
     candidates.into_iter().flatten().collect()
 }
 
 /// Share of the commands beyond the wheels' limit, to which every controller's commands are cut.
-fn beyond_limit(model: &Model, runs: &[&[LogRow]]) -> f64 {
-    let limit_m_s = model.machine.robot.wheel_speed_limit_m_s + AT_LIMIT_M_S;
-    let commanded = runs
-        .iter()
-        .flat_map(|rows| rows.iter())
-        .filter(|row| row.commands());
+fn beyond_limit(runs: &[LoggedRun<'_>]) -> f64 {
     let (mut all, mut beyond) = (0.0_f64, 0.0);
-    for row in commanded {
-        all += 1.0;
-        if row.command.left_m_s.abs().max(row.command.right_m_s.abs()) > limit_m_s {
-            beyond += 1.0;
+    for LoggedRun { model, rows } in runs {
+        let limit_m_s = model.machine.robot.wheel_speed_limit_m_s + AT_LIMIT_M_S;
+        for row in rows.iter().filter(|row| row.commands()) {
+            all += 1.0;
+            if row.command.left_m_s.abs().max(row.command.right_m_s.abs()) > limit_m_s {
+                beyond += 1.0;
+            }
         }
     }
     beyond / all.max(1.0)
@@ -119,15 +129,10 @@ struct Relative {
 
 /// The effect with its factor as it goes over the runs; `None` where it is 1 in all of them. A run of which the log tells nothing
 /// has the mean of the others'.
-fn candidate(
-    name: &str,
-    runs: &[Option<Constants>],
-    factor: impl Fn(&Constants) -> Relative,
-) -> Option<Candidate> {
+fn candidate(name: &str, factors: &[Option<Relative>]) -> Option<Candidate> {
     /// A run's usual length, s, and the change over it that is seen.
     const RUN_S: f64 = 300.0;
     const DRIFTS: f64 = 5e-3;
-    let factors: Vec<Option<Relative>> = runs.iter().map(|run| run.as_ref().map(&factor)).collect();
     let told: Vec<Relative> = factors.iter().flatten().copied().collect();
     let first = told.first()?;
     let beyond = |value: f64, error: f64| value.abs() > SAME.max(4.0 * error);
@@ -176,21 +181,13 @@ mod tests {
     #[test]
     fn a_run_without_readings_tells_nothing_of_a_factor() {
         let of = |gain: f64| {
-            Some(Constants {
-                speed_m_s: [0.05, 0.0],
-                parameter: [gain, 0.0],
-                parameter_error: 1e-6,
-                missed: 0.0,
-                spoilt: Vec::new(),
+            Some(Relative {
+                line: [gain, 0.0],
+                error: 1e-6,
             })
         };
-        let factors = |runs: &[Option<Constants>]| {
-            let factor = |run: &Constants| Relative {
-                line: run.parameter,
-                error: run.parameter_error,
-            };
-            candidate("controller-gain", runs, factor).map(|found| found.setting.pattern)
-        };
+        let factors =
+            |runs: &[Option<Relative>]| candidate("controller-gain", runs).map(|found| found.setting.pattern);
         assert_eq!(
             factors(&[of(1.2), None, of(1.2)]),
             Some(Pattern::Constant(vec![1.2]))

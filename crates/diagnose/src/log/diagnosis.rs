@@ -12,7 +12,7 @@ use super::groups::unlisted_variants;
 use super::implausible::{Implausible, take_out_spikes};
 use super::recut::recut;
 use super::refined::Refined;
-use super::rows::{LogRow, bridged, without_logs};
+use super::rows::{LogRow, LoggedRun, bridged, without_logs};
 use super::search::Search;
 use super::steps::{reading_step, written_step};
 use super::unnamed::Unnamed;
@@ -51,33 +51,36 @@ pub struct Spoilt {
     pub readings: Vec<Vec<Implausible>>,
 }
 
-/// What the robot's logs say that the model lacks. Runs are rows in time order, from the run's start; `watch` is told what is
-/// being tried.
+/// What the robot's logs say that the model lacks, which may be declared otherwise in some runs than in others, but for its walls, its
+/// body and the places of its sensors; `watch` is told what is being tried.
 ///
 /// # Errors
-/// A model that the scene was not made for; logs of which no stretch of 200 control steps with positions and commands
+/// A logged run's model that the scene was not made for; logs of which no stretch of 200 control steps with positions and commands
 /// can be followed.
 pub fn diagnose_logs(
-    model: &Model,
     scene: &Scene,
-    runs: &[&[LogRow]],
+    runs: &[LoggedRun<'_>],
     watch: &Watch<'_>,
 ) -> Result<LogDiagnosis, Error> {
     watch("the controller");
-    let decision = decision(model, runs);
+    let decision = decision(runs);
     let (decide, spoilt) = (decision.decided, decision.spoilt);
     let mut mended: Vec<Vec<LogRow>> = (runs.iter().zip(&spoilt))
-        .map(|(rows, spoilt)| without_logs(rows, spoilt))
+        .map(|(run, spoilt)| without_logs(run.rows, spoilt))
         .collect();
     let spoilt = Spoilt {
         rows: spoilt,
         readings: take_out_spikes(&mut mended),
     };
-    let mended: Vec<Vec<LogRow>> = mended.iter().map(|rows| bridged(rows, &model.run)).collect();
+    let models: Vec<&Model> = runs.iter().map(|run| run.model).collect();
+    let mended: Vec<Vec<LogRow>> = (mended.iter().zip(&models))
+        .map(|(rows, model)| bridged(rows, &model.run))
+        .collect();
     let runs: &[&[LogRow]] = &mended.iter().map(Vec::as_slice).collect::<Vec<_>>();
-    let (wide, scene) = widened(model, scene)?;
+    let logged = (models.iter().zip(runs)).filter(|(_, rows)| !rows.is_empty());
+    let (wide, scene) = widened(logged.map(|(model, _)| *model), scene)?;
     let step = reading_step(runs);
-    let declared = Evidence::new(&scene, model, runs, step.unwrap_or_else(|| written_step(runs)))?;
+    let declared = Evidence::new(&scene, &models, runs, step.unwrap_or_else(|| written_step(runs)))?;
     if declared.stretches.is_empty() {
         return Err(Error::NoLog);
     }
@@ -256,13 +259,15 @@ impl Search<'_> {
         let variants = [self.variants.as_slice(), &unlisted_variants()].concat();
         let refitted = best.refit_without_each(&self.evidence, &variants, runs);
         let certain = whole.len().saturating_sub(best.settings.len());
+        // What runs without a log have tells of all others.
+        let logged = self.evidence.runs();
         let without = |(run, refitted): (usize, Vec<Setting>)| {
             let mut settings = whole.clone();
             settings.truncate(certain);
             settings.extend(refitted);
             for setting in &mut settings {
                 if let Pattern::ByRun(values) = &mut setting.pattern {
-                    take_mean_of_others(values, run);
+                    take_mean_of_others(values, run, logged.iter().copied());
                 }
             }
             settings

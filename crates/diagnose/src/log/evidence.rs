@@ -12,6 +12,7 @@ use super::filter::{Trace, Used, clear_readings, filter, leads_elsewhere, likeli
 use super::rows::{LogRow, stretches};
 use super::screen::{Normal, normal_of};
 use super::steps::WHOLE;
+use crate::Error;
 use crate::candidate::{apart, stage_of, within};
 
 /// A stretch of one run's log and what of it counts.
@@ -22,11 +23,12 @@ pub(crate) struct Stretch<'a> {
     pub(crate) used: Vec<Used>,
 }
 
-/// The logs with the declared model.
+/// The logs with the declared models.
 #[derive(Debug)]
 pub(crate) struct Evidence<'a> {
     pub(crate) scene: &'a Scene,
-    pub(crate) model: &'a Model,
+    /// That of each run.
+    pub(crate) models: &'a [&'a Model],
     pub(crate) stretches: Vec<Stretch<'a>>,
     /// Runs that were measured, with evidence or without.
     pub(crate) measured_runs: usize,
@@ -37,10 +39,14 @@ pub(crate) struct Evidence<'a> {
 /// How far rays are cast, as a multiple of the range: a little beyond it they tell how far away a wall is that is not seen.
 pub(crate) const SIGHT: f64 = 1.2;
 
-/// A model with rays that long, and its scene.
-pub(crate) fn widened(model: &Model, scene: &Scene) -> Result<(Model, Scene), sim::Error> {
-    let mut wide = model.clone();
-    wide.machine.range_m *= SIGHT;
+/// The first of these models, with rays that much longer than the farthest range of them, and its scene.
+pub(crate) fn widened<'m>(
+    mut models: impl Iterator<Item = &'m Model>,
+    scene: &Scene,
+) -> Result<(Model, Scene), Error> {
+    let mut wide = models.next().ok_or(Error::NoLog)?.clone();
+    let ranges_m = models.map(|model| model.machine.range_m);
+    wide.machine.range_m = SIGHT * ranges_m.fold(wide.machine.range_m, f64::max);
     let scene = Scene::new(Arc::new(scene.circuit().clone()), &wide, None)?;
     Ok((wide, scene))
 }
@@ -115,13 +121,13 @@ impl<'a> Evidence<'a> {
     /// filtered there is no evidence.
     pub(crate) fn new(
         scene: &'a Scene,
-        model: &'a Model,
+        models: &'a [&'a Model],
         runs: &[&'a [LogRow]],
         step_counts: f64,
     ) -> Result<Self, sim::Error> {
         let pieces: Vec<(usize, &[LogRow])> = (runs.iter().enumerate())
             .flat_map(|(run, rows)| {
-                stretches(rows, &model.run)
+                stretches(rows, &models[run].run)
                     .into_iter()
                     .map(move |piece| (run, piece))
             })
@@ -129,7 +135,7 @@ impl<'a> Evidence<'a> {
         let stretches = pieces
             .into_par_iter()
             .map(|(run, rows)| {
-                let world = scene.world(model, run)?;
+                let world = scene.world(models[run], run)?;
                 let first = filter(&world, rows, None, step_counts);
                 Ok(first.map(|trace| Stretch {
                     run,
@@ -140,7 +146,7 @@ impl<'a> Evidence<'a> {
             .collect::<Result<Vec<_>, sim::Error>>()?;
         Ok(Self {
             scene,
-            model,
+            models,
             stretches: stretches.into_iter().flatten().collect(),
             measured_runs: runs.len(),
             step_counts,
@@ -169,6 +175,12 @@ impl<'a> Evidence<'a> {
         runs
     }
 
+    /// Time of a physics step, s, in the first of these runs.
+    pub(crate) fn physics_step_s(&self) -> Option<f64> {
+        let rules = &self.models[self.stretches.first()?.run].run;
+        Some(rules.control_step_s / f64::from(rules.physics_steps))
+    }
+
     /// The part of the evidence that one run gives.
     pub(crate) fn of_run(&self, run: usize) -> Self {
         self.where_run(|other| other == run)
@@ -195,7 +207,7 @@ impl<'a> Evidence<'a> {
         let stretches = self.stretches.iter().map(Stretch::clone).collect();
         Evidence {
             scene,
-            model: self.model,
+            models: self.models,
             stretches,
             measured_runs: self.measured_runs,
             step_counts: self.step_counts,
@@ -243,7 +255,7 @@ impl<'a> Evidence<'a> {
     }
 
     pub(crate) fn world(&self, settings: &[Setting], run: usize) -> Result<World<'a>, sim::Error> {
-        let mut model = self.model.clone();
+        let mut model = self.models[run].clone();
         model.effects.extend(settings.iter().cloned());
         self.scene.world(&model, run)
     }

@@ -49,5 +49,5 @@ pub use channels::Channel;
 pub use decide::Decided;
 pub use diagnosis::{LogDiagnosis, Spoilt, diagnose_logs};
 pub use implausible::{Implausible, take_out_implausible};
-pub use rows::{LogRow, can_be_followed};
+pub use rows::{LogRow, LoggedRun, can_be_followed};
 pub use separation::log_separation;

@@ -155,8 +155,7 @@ pub(crate) fn pooled(assessment: &Assessment, count: usize) -> (DMatrix<f64>, DV
 /// The best delay: trial delays about the best one so far, in whole physics steps, as all others do what the nearest of these
 /// does.
 pub(crate) fn hunt_delay(evidence: &Evidence<'_>, setting: &Setting) -> Option<Fitted> {
-    let rules = &evidence.model.run;
-    let step_s = rules.control_step_s / f64::from(rules.physics_steps);
+    let step_s = evidence.physics_step_s()?;
     let (Pattern::Constant(values), param) = (&setting.pattern, &setting.spec.params[0]) else {
         return None;
     };

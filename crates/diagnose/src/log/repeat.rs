@@ -19,7 +19,7 @@ pub(crate) fn repeats<R: Send>(
     let one = |repeat: u64| {
         let logs = simulated(evidence, &rounded, repeat)?;
         let runs: Vec<&[LogRow]> = logs.iter().map(Vec::as_slice).collect();
-        of(&Evidence::new(evidence.scene, evidence.model, &runs, evidence.step_counts).ok()?)
+        of(&Evidence::new(evidence.scene, evidence.models, &runs, evidence.step_counts).ok()?)
     };
     (0..REPEATS).into_par_iter().filter_map(one).collect()
 }

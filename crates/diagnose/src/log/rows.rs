@@ -2,6 +2,15 @@
 
 use sim::{Model, Pose, Readings, Robot, RunRules, Step, Vec2, WheelSpeeds};
 
+/// A run's log and the model that its data set declares.
+#[derive(Debug, Clone, Copy)]
+pub struct LoggedRun<'a> {
+    /// The model.
+    pub model: &'a Model,
+    /// The rows in time order, from the run's start; none of a run without a log.
+    pub rows: &'a [LogRow],
+}
+
 /// One control step of a run's file.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LogRow {

@@ -18,11 +18,15 @@ pub fn log_separation(
     rival: &[Setting],
 ) -> Option<f64> {
     const STEPS: usize = 4;
-    let (_, scene) = widened(model, scene).ok()?;
+    let (_, scene) = widened(std::iter::once(model), scene).ok()?;
     let mut true_model = model.clone();
     true_model.effects.extend_from_slice(answer);
-    let masks = Evidence::new(&scene, &true_model, runs, written_step(runs)).ok()?;
-    let evidence = Evidence { model, ..masks };
+    let [true_models, models] = [&true_model, model].map(|model| vec![model; runs.len()]);
+    let masks = Evidence::new(&scene, &true_models, runs, written_step(runs)).ok()?;
+    let evidence = Evidence {
+        models: &models,
+        ..masks
+    };
     let variants = [evidence.variants(), unlisted_variants()].concat();
     let knobs = knobs_of(rival, &variants);
     let best = refine(&evidence, rival.to_vec(), knobs, STEPS)?.log_likelihood;
