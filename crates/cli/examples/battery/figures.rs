@@ -78,6 +78,13 @@ pub(crate) fn figures(outcomes: &[Outcome]) -> Vec<Figure> {
                 .join(" / "),
         ),
         figure(
+            "the same, without pairs of which one effect is the answer and leaves nothing that the omnibus sees",
+            "",
+            [Outcome::all_right, Outcome::all_reported]
+                .map(|test| share(&of.all(|o| o.label.kind == Kind::Pair && !o.hides_one()), test))
+                .join(" / "),
+        ),
+        figure(
             "by-run patterns of gain or speed recognised as such",
             "95 %",
             share(&of.all(|o| o.label.by_run), Outcome::by_run_right),

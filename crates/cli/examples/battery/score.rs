@@ -22,6 +22,8 @@ pub(crate) struct Trace {
     #[serde(default)]
     pub(crate) alternative_sets: Vec<Vec<String>>,
     #[serde(default)]
+    pub(crate) candidates: Vec<Tried>,
+    #[serde(default)]
     pub(crate) error: Error,
     #[serde(default)]
     pub(crate) baselines: Option<Baselines>,
@@ -59,6 +61,14 @@ pub(crate) struct Interval {
     pub(crate) high: Value,
 }
 
+/// An explanation that was tried to the end, the answer's first.
+#[derive(Debug, Clone, Default, Deserialize)]
+pub(crate) struct Tried {
+    /// Probability that chance leaves what it leaves.
+    #[serde(default)]
+    pub(crate) remainder_p: Option<f64>,
+}
+
 #[derive(Debug, Clone, Default, Deserialize)]
 pub(crate) struct Error {
     pub(crate) before: Option<f64>,
@@ -89,6 +99,9 @@ impl Trace {
     }
 }
 
+/// Probability below which the omnibus sees something.
+const SEEN_P: f64 = 0.01;
+
 /// A data set with its truth and its answer.
 #[derive(Debug, Clone)]
 pub(crate) struct Outcome {
@@ -117,7 +130,22 @@ impl Outcome {
     pub(crate) fn below_detection(&self) -> bool {
         matches!(self.label.kind, Kind::Single | Kind::Outside)
             && self.trace.verdict == "faithful"
-            && self.trace.residual.p.is_some_and(|p| p > 0.01)
+            && self.trace.residual.p.is_some_and(|p| p > SEEN_P)
+    }
+
+    /// Whether one of two effects is the answer, and the omnibus misses the other one beside it.
+    pub(crate) fn hides_one(&self) -> bool {
+        let [name] = self.names()[..] else {
+            return false;
+        };
+        let left = self
+            .trace
+            .candidates
+            .first()
+            .and_then(|answer| answer.remainder_p);
+        self.label.kind == Kind::Pair
+            && (self.label.effects.iter()).any(|truth| alike(&self.label, name, truth))
+            && left.is_some_and(|p| p > SEEN_P)
     }
 
     /// Whether the true name comes first.

@@ -87,6 +87,20 @@ fn pairs_are_sets() {
 }
 
 #[test]
+fn a_pair_hides_one_effect_where_the_other_one_alone_leaves_nothing() {
+    let alone = |name: &str, remainder_p: f64| {
+        let answer = json!({
+            "verdict": "explained", "effects": [{"name": name}], "candidates": [{"remainder_p": remainder_p}],
+        });
+        let truth = ["reading-gain", "acceleration-limit"];
+        outcome(Kind::Pair, &truth, &["sense", "act"], answer).hides_one()
+    };
+    // A name that counts as one with the true one will do.
+    assert!(alone("reading-gain", 0.3) && alone("distance-scale", 0.3));
+    assert!(!alone("reading-gain", 1e-4) && !alone("camera-offset", 0.3));
+}
+
+#[test]
 fn a_pattern_is_recognised_by_its_name_and_its_pattern() {
     let by_run = |answer| {
         let mut set = outcome(Kind::Single, &["reading-gain"], &["sense"], answer);
