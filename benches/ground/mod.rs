@@ -1,6 +1,6 @@
-//! What the benchmarks stand on: the shipped circuit, the declared e-puck, the poses of a driven lap.
+//! What benchmarks, tests and the survey of effects stand on: the shipped circuit, the declared e-puck, the poses of a driven lap.
 
-#![allow(dead_code, reason = "each benchmark uses a part of this file")]
+#![allow(dead_code, reason = "each of them uses a part of this file")]
 
 use std::f64::consts::TAU;
 use std::sync::Arc;

@@ -5,17 +5,16 @@
 //! 20 statistics of second order (spread, roughness, kurtosis). Sets with and without an effect share their draws.
 //! Beside them stand the numbers of an independent simulator.
 
+#[path = "../../../benches/ground/mod.rs"]
+mod ground;
+
 use std::error::Error;
 use std::io::Write;
-use std::sync::Arc;
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use rayon::prelude::*;
-use sim::{
-    Beam, Circuit, Controller, Machine, Model, Mount, ReadingNoise, Response, Robot, RunRules, Scene,
-    Setting, Streams, Vec2, WallRules, drive, find,
-};
-use track::{Course, Lap, Way};
+use sim::{Controller, Model, Scene, Setting, Streams, drive, find};
+use track::Lap;
 
 type Result<T> = std::result::Result<T, Box<dyn Error + Send + Sync>>;
 
@@ -31,22 +30,8 @@ const SECOND: usize = 20;
 fn main() -> Result<()> {
     let mut out = std::io::stdout().lock();
     for (name, controller, column) in [
-        (
-            "Braitenberg",
-            Controller::Braitenberg {
-                speed_m_s: 0.05,
-                gain_per_count: 0.0005,
-            },
-            0,
-        ),
-        (
-            "rule-based",
-            Controller::RuleBased {
-                speed_m_s: 0.05,
-                threshold_counts: 500.0,
-            },
-            1,
-        ),
+        ("Braitenberg", ground::braitenberg(), 0),
+        ("rule-based", ground::rule_based(), 1),
     ] {
         let survey = Survey::new(controller)?;
         let (time_s, spread_s, spread_mm) = survey.lap;
@@ -242,9 +227,8 @@ struct Survey {
 
 impl Survey {
     fn new(controller: Controller) -> Result<Self> {
-        let course = Course::from_toml(include_str!("../../../worlds/roduit2007/world.toml"))?;
-        let model = declared(controller);
-        let scene = Scene::new(Arc::new(Circuit::new(course, 100)?), &model, None)?;
+        let model = ground::model(controller, 0.005);
+        let scene = Scene::new(ground::circuit(), &model, None)?;
         let sets = (0..NULL_SETS)
             .into_par_iter()
             .map(|seed| Set::drive(&scene, &model, seed))
@@ -418,64 +402,4 @@ fn lap_vector(lap: &Lap, offsets_m: &[f64]) -> DVector<f64> {
     let crossing_s = |gate: usize| if gate < 100 { lap.times_s[gate] } else { lap.end_s };
     let durations = (0..20).map(|i| 100.0 * (crossing_s(5 * i + 5) - crossing_s(5 * i)));
     DVector::from_iterator(MEAN, offsets_m.iter().map(|x| 1000.0 * x).chain(durations))
-}
-
-/// The declared e-puck.
-fn declared(controller: Controller) -> Model {
-    let right = [
-        (0.030, -0.010, -0.30),
-        (0.022, -0.025, -0.80),
-        (0.000, -0.031, -1.57),
-        (-0.030, -0.015, -2.64),
-    ];
-    let mount = |x: f64, y: f64, angle_rad: f64| Mount {
-        position: Vec2::new(x, y),
-        angle_rad,
-    };
-    let mounts = std::array::from_fn(|i| {
-        let (x, y, angle_rad) = right[i.min(7 - i)];
-        if i < 4 {
-            mount(x, y, angle_rad)
-        } else {
-            mount(x, -y, -angle_rad)
-        }
-    });
-    Model {
-        machine: Machine {
-            robot: Robot {
-                body_radius_m: 0.037,
-                axle_m: 0.053,
-                wheel_speed_limit_m_s: 0.1288,
-            },
-            mounts,
-            range_m: 0.1,
-            full_scale_counts: 4095.0,
-            response: Response::Improved {
-                a_counts: 4202.93,
-                d0_m: 0.005_219_53,
-                exponent: 1.572_816_92,
-            },
-            noise: ReadingNoise {
-                fraction: 0.05,
-                counts: 8.0,
-            },
-            beam: Beam::single(),
-            controller,
-            slip_level: 0.1,
-            camera_noise_m: 0.001,
-        },
-        run: RunRules {
-            way: Way::Forward,
-            control_step_s: 0.064,
-            physics_steps: 2,
-            start_offset_m: 0.02,
-            start_heading_rad: 0.2,
-            patience_laps: 10.0,
-        },
-        wall: WallRules {
-            max_error_m: 0.005,
-            thickness_m: 0.0,
-        },
-        effects: Vec::new(),
-    }
 }

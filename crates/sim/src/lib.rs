@@ -5,6 +5,10 @@
 //! in (nothing in it changes, so threads share it), a [`Run`] everything that changes. The tick has five stages,
 //! always in this order: sense, decide, act, move, observe.
 
+// What benchmarks and tests stand on names this crate as its users do.
+#[cfg(test)]
+extern crate self as sim;
+
 mod apparatus;
 mod cast;
 mod controller;
