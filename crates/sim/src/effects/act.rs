@@ -6,7 +6,7 @@ use track::Vec2;
 
 use super::plain::{OnDrift, OnDrive, OnGround, OnMachine, OnYaw};
 use super::sense::{decay, rounded};
-use super::{Effect, Hook, Moment, Param, Spec, Stage};
+use super::{AZIMUTH, Effect, Hook, Moment, Param, Spec, Stage};
 use crate::WheelSpeeds;
 
 /// The longest delay, s.
@@ -246,15 +246,7 @@ pub(super) const FLOOR_TILT: Spec = Spec {
     name: "floor-tilt",
     stage: Stage::Act,
     summary: "a constant velocity added to the robot's",
-    params: &[
-        Param::new("speed_m_s", "m/s", 0.0, 0.0, 0.1),
-        Param::place(
-            "azimuth_rad",
-            "rad",
-            -std::f64::consts::TAU,
-            std::f64::consts::TAU,
-        ),
-    ],
+    params: &[Param::new("speed_m_s", "m/s", 0.0, 0.0, 0.1), AZIMUTH],
     list: None,
     build: || {
         Box::new(OnDrift(|values| {

@@ -160,6 +160,14 @@ impl Param {
     }
 }
 
+/// A direction on the floor, counter-clockwise from +x.
+const AZIMUTH: Param = Param::place(
+    "azimuth_rad",
+    "rad",
+    -std::f64::consts::TAU,
+    std::f64::consts::TAU,
+);
+
 /// What everybody needs to know of an effect.
 #[derive(Debug, Clone, Copy)]
 pub struct Spec {

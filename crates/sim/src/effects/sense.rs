@@ -1,7 +1,7 @@
 //! Effects on readings: gains, offsets, crosstalk, lag, noise and rounding.
 
 use super::plain::{OnMachine, OnReadings};
-use super::{Effect, Hook, Moment, Param, Spec, Stage};
+use super::{AZIMUTH, Effect, Hook, Moment, Param, Spec, Stage};
 use crate::{Machine, Readings};
 
 /// Which of S0 to S7.
@@ -83,15 +83,7 @@ pub(super) const DIRECTIONAL_LIGHT: Spec = Spec {
     name: "directional-light",
     stage: Stage::Sense,
     summary: "light from far away: adds counts * max(0, cos(ray direction - azimuth)), before noise",
-    params: &[
-        Param::new("counts", "counts", 0.0, 0.0, 4000.0),
-        Param::place(
-            "azimuth_rad",
-            "rad",
-            -std::f64::consts::TAU,
-            std::f64::consts::TAU,
-        ),
-    ],
+    params: &[Param::new("counts", "counts", 0.0, 0.0, 4000.0), AZIMUTH],
     list: None,
     build: || Box::new(DirectionalLight),
 };
