@@ -27,7 +27,7 @@ pub(crate) enum Interrupted {
 pub(crate) fn install() -> Result<()> {
     ctrlc::set_handler(|| {
         if STOP.raise() {
-            eprintln!("lapwing: stopped at once; what was begun lies in the .partial folder beside --out");
+            eprintln!("lapwing: stopped at once; a folder that was begun is the .partial one beside --out");
             std::process::exit(EXIT_STATUS);
         }
     })
