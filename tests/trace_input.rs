@@ -380,6 +380,58 @@ fn logs_of_sets_with_different_declarations_are_used_together() {
 }
 
 #[test]
+fn sets_with_other_gates_are_refused() {
+    let scratch = Scratch::new();
+    few_laps(&[3]).record(&scratch, "set");
+    let reactive = Robot {
+        controller: Controller::Braitenberg {
+            speed_m_s: 0.05,
+            gain_per_count: 0.001,
+        },
+        declared: "controller.gain_per_count = 0.001\nrun.gates = 50",
+        ..few_laps(&[3])
+    };
+    reactive.record(&scratch, "reactive");
+    let ran = try_trace(&scratch, "braitenberg", "set", &["--measured", "reactive"]);
+    let said =
+        "reactive: declares 50 gates (run.gates), and set has 100: laps are compared at the same gates";
+    assert!(
+        ran.status == Some(2) && ran.stderr.contains(said),
+        "{}",
+        ran.stderr
+    );
+}
+
+#[test]
+fn a_size_of_a_log_is_not_that_of_the_run_that_it_is_judged_by() {
+    let scratch = Scratch::new();
+    let gains = Setting {
+        spec: sim::find("controller-gain").unwrap(),
+        pattern: Pattern::ByRun(vec![vec![0.8], vec![1.3]]),
+    };
+    Robot::with(gains).logged(&[4; 2]).record(&scratch, "set");
+    let found = trace(&scratch, "braitenberg", "set", &[]);
+    says(&found, "explained", &["controller-gain"]);
+    assert_eq!(found["effects"][0]["by"], "run");
+    // Each run has the other one's gain then.
+    let [after, floor] = ["after", "floor"].map(|key| found["error"][key].as_f64().unwrap());
+    assert!(after > 1.5 * floor, "{after} {floor}");
+
+    // Of one log among several runs it is.
+    few_laps(&[4]).record(&scratch, "seen");
+    limping().logged(&[4]).record(&scratch, "logged");
+    let first = scratch.read("seen/run_a.csv");
+    let later: Vec<&str> = first.lines().filter(|line| !line.starts_with("0.000,")).collect();
+    scratch.write("seen/run_a.csv", later.join("\n"));
+    let found = trace(&scratch, "braitenberg", "logged", &["--measured", "seen"]);
+    let said = "One log only: the error after on run logged/a is that of the very run that was fitted.";
+    assert!(
+        found["remarks"].as_array().unwrap().contains(&said.into()),
+        "{found:#}"
+    );
+}
+
+#[test]
 fn the_error_is_that_of_the_set_that_is_held_out() {
     share_signatures("braitenberg");
     let scratch = Scratch::new();

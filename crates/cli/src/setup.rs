@@ -54,6 +54,14 @@ impl Setup {
         sim::drive(&world, streams, laps, record)
     }
 
+    /// Has the camera write positions in multiples of a unit, if one is given: that is noise of it.
+    pub(crate) fn see_in_steps(&mut self, unit_m: Option<f64>) {
+        if let Some(unit_m) = unit_m {
+            let noise_m = &mut self.model.machine.camera_noise_m;
+            *noise_m = noise_m.hypot(unit_m / 12.0_f64.sqrt());
+        }
+    }
+
     /// Laps on a path of times in s and positions in m as a camera sees them from which parts of them are hidden, and the path
     /// too.
     pub(crate) fn seen_through(

@@ -45,6 +45,17 @@ impl Candidate {
         [(value - reach).max(low), (value + reach).min(high)]
     }
 
+    /// The relative error of its size: the least of its fitted values'.
+    pub fn relative_error(&self) -> f64 {
+        let of_value = |(place, (value, error)): (usize, (f64, &f64))| {
+            let neutral = self.param(place)?.neutral?;
+            (*error > 0.0).then(|| error / (value - neutral).abs().max(1e-12))
+        };
+        let values = self.setting.pattern.numbers().into_iter();
+        let errors = values.zip(&self.standard_errors).enumerate().filter_map(of_value);
+        errors.fold(1.0, f64::min)
+    }
+
     /// The parameter of a value by its place in the order of the pattern's values; `None` of a change per second.
     fn param(&self, place: usize) -> Option<&'static Param> {
         let Setting { spec, pattern } = &self.setting;
@@ -143,15 +154,15 @@ pub(crate) fn stage_of(setting: &Setting) -> Stage {
     Cause::of(setting).map_or(setting.spec.stage, |cause| cause.stage)
 }
 
-/// Gives one run the mean of the values of all others of these.
-pub(crate) fn take_mean_of_others(values: &mut [Vec<f64>], run: usize, of: impl Iterator<Item = usize>) {
-    let others: Vec<usize> = of.filter(|&other| other != run).collect();
-    if others.is_empty() || run >= values.len() {
+/// Gives one run of several the mean of the other runs' values.
+pub(crate) fn take_mean_of_others(values: &mut [Vec<f64>], run: usize) {
+    let others = values.len() as f64 - 1.0;
+    if others < 1.0 || run >= values.len() {
         return;
     }
     for i in 0..values[run].len() {
-        let sum: f64 = others.iter().map(|&other| values[other][i]).sum();
-        values[run][i] = sum / others.len() as f64;
+        let sum: f64 = values.iter().map(|values| values[i]).sum();
+        values[run][i] = (sum - values[run][i]) / others;
     }
 }
 
@@ -193,12 +204,10 @@ mod tests {
     #[test]
     fn a_run_takes_the_mean_of_the_others() {
         let mut values = vec![vec![1.0, 5.0], vec![9.0, 9.0], vec![3.0, 6.0]];
-        take_mean_of_others(&mut values, 1, 0..3);
+        take_mean_of_others(&mut values, 1);
         assert_eq!(values, [[1.0, 5.0], [2.0, 5.5], [3.0, 6.0]]);
-        take_mean_of_others(&mut values, 0, [0, 2].into_iter());
-        assert_eq!(values[0], [3.0, 6.0]);
         let mut alone = vec![vec![1.0]];
-        take_mean_of_others(&mut alone, 0, 0..1);
+        take_mean_of_others(&mut alone, 0);
         assert_eq!(alone, [[1.0]]);
     }
 

@@ -6,13 +6,22 @@ use crate::{far, median};
 
 /// The rows in which a camera that has stopped gives its last sighting again and again.
 pub fn repeated_sightings(position_m: &[Option<[f64; 2]>]) -> Vec<usize> {
-    /// Sightings that are the same by chance, or as they are rounded, at most.
+    /// Sightings that are the same by chance at most; where positions are coarse, of a robot that turns on the spot.
     const LEAST: usize = 8;
+    const LEAST_COARSE: usize = 64;
+    /// As coarse as the camera's noise, m.
+    const COARSE_M: f64 = 0.001;
+    let unit_m = coarse_unit_m(position_m.iter().flatten().flatten().copied());
+    let least = if unit_m.is_some_and(|unit_m| unit_m > COARSE_M) {
+        LEAST_COARSE
+    } else {
+        LEAST
+    };
     let seen: Vec<usize> = (0..position_m.len())
         .filter(|&row| position_m[row].is_some())
         .collect();
     let same = seen.chunk_by(|&a, &b| position_m[a] == position_m[b]);
-    same.filter(|rows| rows.len() >= LEAST)
+    same.filter(|rows| rows.len() >= least)
         .flat_map(|rows| rows[1..].to_vec())
         .collect()
 }
@@ -62,6 +71,8 @@ pub fn stray_sightings(t_s: &[f64], position_m: &[Option<[f64; 2]>]) -> Vec<usiz
     const OFF_M: f64 = 0.05;
     /// Time within which it has come back, s, if not with the very next sighting.
     const SOON_S: f64 = 0.6;
+    /// Sightings at either end that are taken for strays.
+    const FEW: usize = 3;
     /// Share of the sightings that are many.
     const MANY: f64 = 0.01;
     let sighting = |(row, (&time_s, position)): (usize, (&f64, &Option<[f64; 2]>))| {
@@ -81,11 +92,11 @@ pub fn stray_sightings(t_s: &[f64], position_m: &[Option<[f64; 2]>]) -> Vec<usiz
         way_m <= OFF_M + FAST_M_S * (to.time_s - from.time_s)
     };
     let mut strays = Vec::new();
-    let mut last = 0;
-    if seen.len() > 2 && !gets(0, 1) && gets(1, 2) {
-        strays.push(seen[0].row);
-        last = 1;
-    }
+    // Where it was before, or is after, tells nothing at either end.
+    let first =
+        (1..=FEW).find(|&first| first + 1 < seen.len() && !gets(first - 1, first) && gets(first, first + 1));
+    let mut last = first.unwrap_or(0);
+    strays.extend(seen[..last].iter().map(|sighting| sighting.row));
     let mut next = last + 1;
     while next < seen.len() {
         if !gets(last, next) {
@@ -94,6 +105,9 @@ pub fn stray_sightings(t_s: &[f64], position_m: &[Option<[f64; 2]>]) -> Vec<usiz
             if let Some(back) = later.find(|&later| gets(last, later)) {
                 strays.extend(seen[next..back].iter().map(|sighting| sighting.row));
                 next = back;
+            } else if seen.len() - next <= FEW && last > 0 && gets(last - 1, last) {
+                strays.extend(seen[next..].iter().map(|sighting| sighting.row));
+                break;
             }
         }
         last = next;
@@ -215,6 +229,10 @@ mod tests {
         assert_eq!(repeated_sightings(&seen), [0; 0]);
         seen[708] = last;
         assert_eq!(repeated_sightings(&seen), [701, 702, 703, 705, 706, 707, 708]);
+        // In whole centimetres a robot that turns on the spot stays where it is.
+        let coarse = |at: &Option<[f64; 2]>| at.map(|at| at.map(|m| (100.0 * m).round() / 100.0));
+        let seen: Vec<_> = seen.iter().map(coarse).collect();
+        assert_eq!(repeated_sightings(&seen), [0; 0]);
     }
 
     #[test]
@@ -228,6 +246,10 @@ mod tests {
         }
         seen[402] = None;
         assert_eq!(stray_sightings(&t_s, &seen), [0, 400, 401, 700]);
+        for row in [1, 998, 999] {
+            seen[row] = Some([57.0, 0.5]);
+        }
+        assert_eq!(stray_sightings(&t_s, &seen), [0, 1, 400, 401, 700, 998, 999]);
         // Carried elsewhere it does not come back.
         let mut carried = way.clone();
         carried[500..].iter_mut().flatten().for_each(|at| at[1] = 0.9);

@@ -241,7 +241,7 @@ impl<'w> Forecast<'w> {
         mut each: impl FnMut(Pose, WheelSpeeds),
     ) -> (Pose, Vec2) {
         let rules = self.apparatus.world.rules();
-        let step_s = rules.control_step_s / f64::from(rules.physics_steps);
+        let step_s = rules.physics_step_s();
         let start_s = self.now.time_s;
         let mut now = Moment {
             pose,

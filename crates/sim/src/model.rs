@@ -48,6 +48,13 @@ pub struct RunRules {
     pub patience_laps: f64,
 }
 
+impl RunRules {
+    /// Time of a physics step, s.
+    pub fn physics_step_s(&self) -> f64 {
+        self.control_step_s / f64::from(self.physics_steps)
+    }
+}
+
 /// How exact walls become straight pieces.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WallRules {

@@ -235,7 +235,7 @@ impl<'w> Run<'w> {
     #[inline]
     fn act(&mut self, mut now: Moment) {
         let rules = self.apparatus.world.rules();
-        let step_s = rules.control_step_s / f64::from(rules.physics_steps);
+        let step_s = rules.physics_step_s();
         let start_s = now.time_s;
         now.step_s = step_s;
         for k in 0..rules.physics_steps {

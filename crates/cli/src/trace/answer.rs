@@ -97,7 +97,10 @@ impl FromLogs {
     }
 }
 
-/// The sets of names among the explanations that the data do not tell apart, the answer's first.
+/// The explanations that the data do not tell apart, the answer's first; none where nothing is claimed.
 pub(crate) fn rivals(answer: &Answer) -> &[Explanation] {
-    &answer.explanations[..answer.indistinguishable]
+    match answer.claimed() {
+        Some(_) => &answer.explanations[..answer.indistinguishable],
+        None => &[],
+    }
 }

@@ -61,13 +61,19 @@ pub(super) fn atlas(
     purpose: Purpose,
     cache: &Cache,
 ) -> Result<Atlas> {
-    let of = |recording| atlas_of(session, recording, purpose, cache);
+    let physics_step_s = recordings[0].setup.model.run.physics_step_s();
+    let of = |recording| atlas_of(session, recording, (purpose, physics_step_s), cache);
     let parts = recordings.iter().map(of).collect::<Result<Vec<_>>>()?;
     Ok(Atlas::join(parts).expect("at least one data set is measured"))
 }
 
-/// A recording's atlas, from the cache or made now.
-fn atlas_of(session: &Session, recording: &Recording, purpose: Purpose, cache: &Cache) -> Result<Atlas> {
+/// A recording's atlas, from the cache or made now; delays in it come in steps that all recordings share.
+fn atlas_of(
+    session: &Session,
+    recording: &Recording,
+    (purpose, physics_step_s): (Purpose, f64),
+    cache: &Cache,
+) -> Result<Atlas> {
     let Recording { config, world, .. } = recording;
     let shape = recording.shape();
     let alike = recording.expects_the_same_of_runs();
@@ -83,7 +89,10 @@ fn atlas_of(session: &Session, recording: &Recording, purpose: Purpose, cache: &
     if !alike {
         key += &format!("\n{:?}", recording.places(&[]));
     }
-    if let Some(atlas) = cache.get(&key) {
+    if physics_step_s != recording.setup.model.run.physics_step_s() {
+        key += &format!("\ndelays in {physics_step_s} s");
+    }
+    if let Some(atlas) = cache.get(&key, physics_step_s) {
         return Ok(atlas);
     }
     let doing = match purpose {
@@ -93,7 +102,7 @@ fn atlas_of(session: &Session, recording: &Recording, purpose: Purpose, cache: &
     let progress = session.progress(doing, purpose.sets(recording.cuts.len()));
     let tick = || progress.tick(1);
     let atlas = with_simulations(recording, session.seed(), |declared, cuts| match purpose {
-        Purpose::Name => Atlas::new(declared, cuts, alike, &tick),
+        Purpose::Name => Atlas::new(declared, cuts, alike, physics_step_s, &tick),
         Purpose::Judge => Atlas::without_effects(declared, cuts, alike, &tick),
     });
     drop(progress);

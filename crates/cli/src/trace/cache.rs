@@ -31,12 +31,12 @@ impl Cache {
         self.0.as_ref().map(|folder| folder.join(name))
     }
 
-    /// The atlas of a key, if it is there and whole.
-    pub(crate) fn get(&self, key: &str) -> Option<Atlas> {
+    /// The atlas of a key, with such physics steps, if it is there and whole.
+    pub(crate) fn get(&self, key: &str, physics_step_s: f64) -> Option<Atlas> {
         let bytes = fs::read(self.file(key)?).ok()?;
         let (hash, atlas) = bytes.split_at_checked(64)?;
         (sha256(atlas).as_bytes() == hash)
-            .then(|| Atlas::from_bytes(atlas))
+            .then(|| Atlas::from_bytes(atlas, physics_step_s))
             .flatten()
     }
 

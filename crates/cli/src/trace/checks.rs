@@ -9,7 +9,7 @@ use crate::laps::Measured;
 use crate::setup::Setup;
 
 /// Whether laps take about as long as the declared robot's: if not, by no effect that is worth a search, times are in another unit.
-pub(super) fn in_seconds(measured: &Measured, setup: &Setup) -> Result<()> {
+fn in_seconds(measured: &Measured, setup: &Setup) -> Result<()> {
     /// A robot that turns on the spot needs longer than the midline's length at its speed says.
     const TIMES: f64 = 5.0;
     let declared_s = setup.scene.world(&setup.model, 0)?.nominal_lap_s();
@@ -27,7 +27,7 @@ pub(super) fn in_seconds(measured: &Measured, setup: &Setup) -> Result<()> {
 }
 
 /// Whether a run has a row for each control step of the declared robot: of laps some may be missing, but none be between.
-pub(super) fn in_control_steps(run: &RunFile, step_s: f64) -> Result<()> {
+fn in_control_steps(run: &RunFile, step_s: f64) -> Result<()> {
     /// Share by which a step may be off.
     const OFF: f64 = 0.25;
     if run.rows.t_s.len() < 2 {
@@ -45,6 +45,17 @@ pub(super) fn in_control_steps(run: &RunFile, step_s: f64) -> Result<()> {
         run.path.display()
     );
     Ok(())
+}
+
+/// Whether the runs of a data set have the times of a robot whose model it declares.
+pub(super) fn is_timed(measured: &Measured, setup: &Setup) -> Result<()> {
+    in_seconds(measured, setup)?;
+    let step_s = setup.model.run.control_step_s;
+    measured
+        .set
+        .runs
+        .iter()
+        .try_for_each(|run| in_control_steps(run, step_s))
 }
 
 /// Refuses data that are not the model's.

@@ -6,7 +6,7 @@ use std::ops::Range;
 use anyhow::Result;
 use diagnose::{Answer, MeanLaps, Unseen};
 use rayon::prelude::*;
-use sim::{Setting, Step, Streams};
+use sim::{Setting, Streams};
 use track::Lap;
 
 use super::recording::{HeldOut, Recording, RunPlace};
@@ -188,14 +188,7 @@ fn mean_laps(
         };
         let place = places[i as usize % places.len()];
         let world = setup.scene.world(&model, place.number)?;
-        let Some(unseen) = place.unseen else {
-            return Ok(sim::drive_from(&world, streams, place.start, laps, |_| {})?.laps);
-        };
-        let mut path = Vec::new();
-        let record = |step: &Step| path.push((step.time_s, step.observed));
-        let mut driven = sim::drive_from(&world, streams, place.start, laps, record)?.laps;
-        driven.retain(|lap| lap.missed.is_empty());
-        Ok(setup.seen_through(unseen, driven, &mut path))
+        Ok(place.drive(setup, &world, streams, laps)?.0)
     };
     let driven = (0..runs).into_par_iter().map(drive).collect::<Result<Vec<_>>>()?;
     Ok(MeanLaps::new(&driven)?)

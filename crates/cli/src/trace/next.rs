@@ -1,7 +1,7 @@
 //! The experiment that would tell apart what these data do not.
 
 use anyhow::Result;
-use diagnose::{Candidate, Explanation, LogRow, ObservedLap, Rival, log_separation, separations};
+use diagnose::{Explanation, LogRow, ObservedLap, Rival, log_separation, separations};
 use sim::{Controller, Setting, Stage, Step, Streams};
 
 use super::Trace;
@@ -159,7 +159,9 @@ fn changed(recording: &Recording, declared: &[(&'static str, String)]) -> Option
     for (key, value) in declared {
         config = config.with(key, value).ok()?;
     }
-    Setup::new(&config, recording.measured.circuit.clone(), None).ok()
+    let mut setup = Setup::new(&config, recording.measured.circuit.clone(), None).ok()?;
+    setup.see_in_steps(recording.written_m);
+    Some(setup)
 }
 
 fn by_laps(
@@ -180,7 +182,7 @@ fn by_laps(
     let rivals: Vec<Rival> = (others.iter())
         .map(|other| Rival {
             settings: first_runs(&other.settings()),
-            relative_error: relative_error(&other.effects[0]),
+            relative_error: other.effects[0].relative_error(),
         })
         .collect();
     let found = separations(&simulate, &first_runs(&answer.settings()), &rivals)?;
@@ -244,24 +246,4 @@ fn first_runs(settings: &[Setting]) -> Vec<Setting> {
         _ => setting.clone(),
     };
     settings.iter().map(fitted).collect()
-}
-
-/// The relative error of an effect's size: the least of its fitted values'.
-fn relative_error(effect: &Candidate) -> f64 {
-    let values = match &effect.setting.pattern {
-        sim::Pattern::Constant(values) => values.clone(),
-        sim::Pattern::ByTime { start, .. } => start.clone(),
-        sim::Pattern::ByRun(runs) => runs.concat(),
-    };
-    let params = effect.setting.spec.params;
-    values
-        .iter()
-        .zip(&effect.standard_errors)
-        .enumerate()
-        .filter(|(_, (_, error))| **error > 0.0)
-        .filter_map(|(i, (value, error))| {
-            let neutral = params.get(i % params.len())?.neutral?;
-            Some(error / (value - neutral).abs().max(1e-12))
-        })
-        .fold(1.0, f64::min)
 }

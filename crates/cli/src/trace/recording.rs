@@ -4,10 +4,10 @@ use std::path::Path;
 
 use anyhow::{Context, Result, ensure};
 use diagnose::{ObservedLap, Unseen, coarse_unit_m};
-use sim::{Setting, Start, Step, Streams};
+use sim::{Setting, Start, Step, Streams, Vec2, World};
 use track::Lap;
 
-use super::checks::{belongs, in_control_steps, in_seconds};
+use super::checks::{belongs, is_timed};
 use crate::config::{Config, ModelFile};
 use crate::dataset::{DataSet, RunFile};
 use crate::interrupt;
@@ -44,6 +44,32 @@ pub(crate) struct RunPlace<'a> {
     pub(crate) unseen: Option<&'a Unseen>,
 }
 
+/// When and where a robot was seen, s and m.
+type SeenPath = Vec<(f64, Vec2)>;
+
+impl RunPlace<'_> {
+    /// The closed laps of a run in this place, as they are seen, on their path.
+    ///
+    /// # Errors
+    /// An effect without values for this run.
+    pub(super) fn drive(
+        &self,
+        setup: &Setup,
+        world: &World<'_>,
+        streams: Streams,
+        laps: usize,
+    ) -> Result<(Vec<Lap>, SeenPath), sim::Error> {
+        let mut path = Vec::new();
+        let record = |step: &Step| path.push((step.time_s, step.observed));
+        let mut closed = sim::drive_from(world, streams, self.start, laps, record)?.laps;
+        closed.retain(|lap| lap.missed.is_empty());
+        if let Some(unseen) = self.unseen {
+            closed = setup.seen_through(unseen, closed, &mut path);
+        }
+        Ok((closed, path))
+    }
+}
+
 impl Recording {
     /// Data sets, checked against the model.
     ///
@@ -58,7 +84,17 @@ impl Recording {
         let mut recordings: Vec<Self> = Vec::with_capacity(sets.len());
         for set in sets {
             let first_run = runs(&recordings).count();
-            recordings.push(Self::new(session, file, world, set, first_run)?);
+            let next = Self::new(session, file, world, set, first_run)?;
+            if let Some(first) = recordings.first() {
+                let [all, own] = [first, &next].map(|recording| recording.config.run.gates);
+                ensure!(
+                    own == all,
+                    "{}: declares {own} gates (run.gates), and {} has {all}: laps are compared at the same gates",
+                    next.measured.set.folder.display(),
+                    first.measured.set.folder.display()
+                );
+            }
+            recordings.push(next);
         }
         Ok(recordings)
     }
@@ -88,15 +124,8 @@ impl Recording {
             .iter()
             .flat_map(|run| run.rows.position_m.iter().flatten());
         let written_m = coarse_unit_m(positions.flatten().copied());
-        if let Some(unit_m) = written_m {
-            let noise_m = &mut setup.model.machine.camera_noise_m;
-            *noise_m = noise_m.hypot(unit_m / 12.0_f64.sqrt());
-        }
-        in_seconds(&measured, &setup)?;
-        let step_s = setup.model.run.control_step_s;
-        for run in &measured.set.runs {
-            in_control_steps(run, step_s)?;
-        }
+        setup.see_in_steps(written_m);
+        is_timed(&measured, &setup)?;
         let cuts = diagnose::other_cuts(&setup.scene, &setup.model)
             .into_iter()
             .map(|scene| Setup {
@@ -105,7 +134,7 @@ impl Recording {
             })
             .collect();
         Ok(Self {
-            unseen: unseen(&measured, step_s),
+            unseen: unseen(&measured, setup.model.run.control_step_s),
             written_m,
             config,
             setup,
@@ -233,20 +262,8 @@ impl Recording {
                 seed: seeds.of_fit(),
                 run: run as u64,
             };
-            let mut path = Vec::new();
-            let record = |step: &Step| path.push((step.time_s, step.observed));
-            let drive = sim::drive_from(&world, streams, place.start, laps, record).ok()?;
-            let closed: Vec<Lap> = (drive.laps.into_iter())
-                .filter(|lap| lap.missed.is_empty())
-                .collect();
-            if closed.len() != laps {
-                return None;
-            }
-            let closed = match place.unseen {
-                Some(unseen) => setup.seen_through(unseen, closed, &mut path),
-                None => closed,
-            };
-            Some(setup.observed(closed, &path))
+            let (closed, path) = place.drive(setup, &world, streams, laps).ok()?;
+            (closed.len() == laps).then(|| setup.observed(closed, &path))
         };
         runs.enumerate().map(run).collect()
     }
@@ -305,6 +322,7 @@ impl HeldOut {
         belongs(&set, &config, &recordings[place].world)?;
         let Recording { measured, setup, .. } = &recordings[place];
         let measured = Measured::on(set, measured.circuit.clone())?;
+        is_timed(&measured, setup)?;
         Ok(Self {
             recording: place,
             unseen: unseen(&measured, setup.model.run.control_step_s),

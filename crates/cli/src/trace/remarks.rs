@@ -4,6 +4,7 @@ use diagnose::LogRow;
 
 use super::logs::Logs;
 use super::recording::{Recording, runs};
+use crate::laps::SampledRun;
 
 /// What these data do not allow; `logged` are the logs that are used.
 pub(super) fn remarks(recordings: &[Recording], logged: Option<&Logs>) -> Vec<String> {
@@ -47,6 +48,16 @@ pub(super) fn remarks(recordings: &[Recording], logged: Option<&Logs>) -> Vec<St
     }
     if let Some(logs) = logged {
         remarks.extend(logs.implausible.iter().cloned());
+        let told: Vec<&SampledRun> = (runs(recordings).zip(&logs.runs))
+            .filter(|(_, rows)| rows.iter().any(LogRow::tells))
+            .map(|(run, _)| run)
+            .collect();
+        if let ([run], true) = (told.as_slice(), logs.runs.len() > 1) {
+            remarks.push(format!(
+                "One log only: the error after on run {} is that of the very run that was fitted.",
+                run.name
+            ));
+        }
         for (run, rows) in runs(recordings).zip(&logs.runs) {
             if !rows.is_empty() && !rows.iter().any(LogRow::tells) {
                 remarks.push(format!(

@@ -77,8 +77,8 @@ impl Atlas {
     pub const RECIPE: u32 = 5;
 
     /// Simulates everything for one recording; `cuts` simulate the declared model with walls that another program may have
-    /// cut, which is no departure from it; `alike` says whether the declared model does the same in every run. `tick` is called
-    /// after each simulated data set.
+    /// cut, which is no departure from it; `alike` says whether the declared model does the same in every run, whose physics steps
+    /// take `physics_step_s`. `tick` is called after each simulated data set.
     ///
     /// # Errors
     /// A declared model that does not complete its laps.
@@ -86,9 +86,10 @@ impl Atlas {
         simulate: &Simulate<'_>,
         cuts: &[&Simulate<'_>],
         alike: bool,
+        physics_step_s: f64,
         tick: &(dyn Fn() + Sync),
     ) -> Result<Self, Error> {
-        Self::with_probes(simulate, cuts, alike, probes(), tick)
+        Self::with_probes(simulate, cuts, alike, probes(physics_step_s), tick)
     }
 
     /// An atlas that knows no effect: enough to judge laps by, not to name what they lack.
@@ -212,8 +213,8 @@ impl Atlas {
         .expect("numbers and lists have a form as bytes")
     }
 
-    /// The atlas of [`Atlas::to_bytes`]; `None` for bytes that are none, or that were made with other probes.
-    pub fn from_bytes(bytes: &[u8]) -> Option<Self> {
+    /// The atlas of [`Atlas::to_bytes`] with such physics steps; `None` for bytes that are none, or that were made with other probes.
+    pub fn from_bytes(bytes: &[u8], physics_step_s: f64) -> Option<Self> {
         let Stored {
             probes: made_with,
             null,
@@ -226,7 +227,7 @@ impl Atlas {
         let probes = if made_with.is_empty() {
             Vec::new()
         } else {
-            probes()
+            probes(physics_step_s)
         };
         (made_with == fingerprint(&probes)).then_some(Self {
             null,
@@ -243,7 +244,8 @@ impl Atlas {
     /// Number of data sets that [`Atlas::new`] simulates with so many other cuts.
     pub fn sets(cuts: usize) -> u64 {
         let sets = |probe: &Probe| PATH_SETS * probe.sizes.len() as u64;
-        Self::null_sets(cuts) + probes().iter().map(sets).sum::<u64>()
+        // As many whatever the step.
+        Self::null_sets(cuts) + probes(1.0).iter().map(sets).sum::<u64>()
     }
 
     /// Number of data sets that [`Atlas::without_effects`] simulates with so many other cuts.

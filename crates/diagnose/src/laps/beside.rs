@@ -96,7 +96,14 @@ impl Trial<'_> {
     /// What an expectation leaves of the data, in units of a base's scatter, but for what the base's numbers can follow.
     pub(super) fn left_beyond(&self, base: &Base, expected: &Expectation) -> White {
         let scatter = base.scatter.as_ref().unwrap_or(&self.atlas.scatter);
-        base.beyond(white(scatter, &self.atlas.layout, self.data, expected))
+        let without_silent = |mut left: White| {
+            for range in self.silent {
+                left.rows_mut(range.start, range.len()).fill(0.0);
+            }
+            left
+        };
+        let left = white(scatter, &self.atlas.layout, self.data, expected);
+        without_silent(base.beyond(without_silent(left)))
     }
 
     /// What some simulated data sets leave of the data with further settings beside a base; see [`Trial::left_beyond`]. `None`

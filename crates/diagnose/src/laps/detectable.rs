@@ -3,6 +3,7 @@
 use super::atlas::{Atlas, White};
 use super::diagnosis::ALARM_SCORE;
 use super::screen::price;
+use crate::candidate::label;
 use crate::detectable::{Detectable, QUANTILE_95};
 
 impl Atlas {
@@ -28,7 +29,7 @@ impl Atlas {
         };
         Some(Detectable {
             spec: p.spec,
-            label: p.label(),
+            label: label(&p.setting(p.neutral)),
             parameter: param.name,
             unit: param.unit,
             below: side(-1.0),

@@ -57,6 +57,7 @@ impl Atlas {
             atlas: self,
             simulate,
             data: &data,
+            silent: &[],
         };
         let search = Search {
             trial,
@@ -293,6 +294,7 @@ impl Atlas {
             atlas: self,
             simulate,
             data: &data,
+            silent: &[],
         };
         let after = trial.remainder(effects);
         Ok((

@@ -270,8 +270,7 @@ impl Hypothesis {
     /// This hypothesis with the sizes of one run replaced by the mean of the other runs', where they go by run.
     pub(super) fn with_mean_size(mut self, run: usize) -> Self {
         for part in self.parts.iter_mut() {
-            let runs = 0..part.values.len();
-            take_mean_of_others(&mut part.values, run, runs);
+            take_mean_of_others(&mut part.values, run);
         }
         self
     }

@@ -140,10 +140,13 @@ impl Trial<'_> {
                 action.rows_mut(own.start, own.len()).fill(0.0);
             }
         }
-        let without = Trial { data: &data, ..*self };
+        let without = Trial {
+            data: &data,
+            silent: &silent,
+            ..*self
+        };
         let nearest = without.nearest(&local.center, &local.scatter, &columns, &look.freedoms, &silent);
         let found = self.atlas.with_moves(&look.about, &look.freedoms, &nearest.moves);
-        // The run itself is as expected, and so has no say.
         let hunted = without.hunt_about(&found).unwrap_or(found);
         Ok(self.atlas.quantised(hunted))
     }

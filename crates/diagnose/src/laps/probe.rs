@@ -363,14 +363,14 @@ pub(super) fn other_at_place(probes: &[Probe], one: usize, values: &[f64]) -> Op
 
 /// Everything that is tried. A list of sizes spans what robots of this kind do; fits may leave it.
 ///
-/// `controller-speed` is not among them, because laps cannot tell it from `wheel-scale`.
-pub(super) fn probes() -> Vec<Probe> {
+/// `controller-speed` is not among them, because laps cannot tell it from `wheel-scale`. Delays come in physics steps.
+pub(super) fn probes(physics_step_s: f64) -> Vec<Probe> {
     let delay = |p: Probe| Probe {
-        quantum: Some(0.032),
+        quantum: Some(physics_step_s),
         ..p
     };
     let steps: Vec<f64> = (1..=15).map(|k| 0.002 * f64::from(k)).collect();
-    let delays: Vec<f64> = (1..=10).map(|k| 0.032 * f64::from(k)).collect();
+    let delays: Vec<f64> = (1..=10).map(|k| physics_step_s * f64::from(k)).collect();
     [
         line("cone-of-view", &[0.1, 0.2, 0.3, 0.45, 0.6]),
         line("reading-gain", &[0.7, 0.83, 0.93, 1.07, 1.2, 1.4]),
@@ -446,7 +446,7 @@ mod tests {
     #[test]
     fn ranges_span_the_sizes_on_both_sides_of_nothing() {
         let range = |name: &str, number: usize| {
-            let probes = probes();
+            let probes = probes(0.032);
             let found = probes.iter().find(|probe| probe.spec.name == name);
             found.map(|probe| probe.range_of(number))
         };
@@ -472,7 +472,7 @@ mod tests {
 
     #[test]
     fn a_vector_is_as_large_as_it_reaches_along_its_direction() {
-        let probes = probes();
+        let probes = probes(0.032);
         let offsets: Vec<&Probe> = (probes.iter())
             .filter(|probe| probe.spec.name == "camera-offset")
             .collect();
@@ -496,7 +496,7 @@ mod tests {
     #[test]
     fn smallest_sizes_do_least_to_either_side() {
         let smallest = |name: &str| {
-            let probes = probes();
+            let probes = probes(0.032);
             let found = probes.iter().find(|probe| probe.spec.name == name);
             found.expect("the effect is tried").smallest_sizes()
         };
@@ -509,7 +509,7 @@ mod tests {
 
     #[test]
     fn at_the_place_of_a_bump_may_be_a_patch_on_the_same_wall_and_a_sensor_may_be_another() {
-        let probes = probes();
+        let probes = probes(0.032);
         let number = |name: &str| {
             probes
                 .iter()

@@ -1,5 +1,7 @@
 //! What is tried on a data set.
 
+use std::ops::Range;
+
 use super::atlas::{Atlas, Simulate};
 use super::expectation::Expectation;
 
@@ -9,4 +11,6 @@ pub(super) struct Trial<'a> {
     pub(super) atlas: &'a Atlas,
     pub(super) simulate: &'a Simulate<'a>,
     pub(super) data: &'a Expectation,
+    /// Entries that have no say in the size of what jumps.
+    pub(super) silent: &'a [Range<usize>],
 }

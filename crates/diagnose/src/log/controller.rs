@@ -9,7 +9,7 @@ use super::steps::written_counts;
 use crate::outlying::median;
 
 /// Largest error of a speed that is written with 5 decimals; its standard deviation is about half of that.
-pub(crate) const SPEED_ROUNDING_M_S: f64 = 6e-6;
+const SPEED_ROUNDING_M_S: f64 = 6e-6;
 /// How near the wheels' limit a written command is at it, m/s.
 pub(crate) const AT_LIMIT_M_S: f64 = 2e-5;
 /// Share of the control steps that may miss by more, where a command was cut or a file was mended.
@@ -53,6 +53,12 @@ impl Run {
         SPEED_ROUNDING_M_S.max(0.6 * self.written_m_s)
     }
 
+    /// Standard error of V: roundings of commands that repeat are no independent errors.
+    fn speed_error_m_s(&self) -> f64 {
+        const OF_ONE: f64 = 0.05;
+        OF_ONE * self.speed_rounding_m_s()
+    }
+
     /// Largest error of a sum of three readings.
     fn sum_rounding_counts(&self) -> f64 {
         1.6 * self.written_counts
@@ -67,10 +73,11 @@ impl Run {
 /// A line over time: value at the run's start and change per second.
 pub(crate) type Line = [f64; 2];
 
-/// One run's constants: speed V and the controller's own parameter, with the parameter's standard error.
+/// One run's constants: speed V and the controller's own parameter, with their standard errors.
 #[derive(Debug, Clone)]
 pub(crate) struct Constants {
     pub(crate) speed_m_s: Line,
+    pub(crate) speed_error_m_s: f64,
     pub(crate) parameter: Line,
     pub(crate) parameter_error: f64,
     /// Share of the choices that they do not explain.
@@ -218,6 +225,7 @@ fn braitenberg(run: &Run, sloped: bool) -> Constants {
     let slope_error = deviation_m_s * error_of_slope(choices.iter().map(difference), run.written_counts);
     Constants {
         speed_m_s: mean,
+        speed_error_m_s: run.speed_error_m_s(),
         // (a + b t) / (c + d t) to first order in time.
         parameter: [gain, (product[1] - gain * mean[1]) / mean[0]],
         parameter_error: slope_error / mean[0].abs() + 1e-9 * gain.abs(),
@@ -317,6 +325,7 @@ fn rules(run: &Run, declared_counts: f64, sloped: bool) -> Constants {
     });
     Constants {
         speed_m_s: speed,
+        speed_error_m_s: run.speed_error_m_s(),
         parameter: [threshold, slope],
         parameter_error: ((high - low) / 12.0_f64.sqrt())
             .hypot(run.sum_deviation_counts())

@@ -4,9 +4,7 @@ use std::collections::BTreeMap;
 
 use sim::{Controller, Pattern, Setting, find};
 
-use super::controller::{
-    AT_LIMIT_M_S, Constants, FORGIVEN, Line, SPEED_ROUNDING_M_S, constants_by_run, most_missed,
-};
+use super::controller::{AT_LIMIT_M_S, Constants, FORGIVEN, Line, constants_by_run, most_missed};
 use super::rows::LoggedRun;
 use crate::Candidate;
 use crate::candidate::{OfRun, filled};
@@ -30,11 +28,13 @@ pub enum Decided {
 /// Relative change of a constant below which it is the declared one.
 const SAME: f64 = 2e-4;
 
-/// The verdict, and which rows of each run it does not hold for: single ones that were spoilt after the robot had driven by
-/// them.
+/// The verdict with what goes with it.
 #[derive(Debug)]
 pub(crate) struct Decision {
     pub(crate) decided: Decided,
+    /// What the constants are without what each run tells.
+    pub(crate) without: Vec<Vec<Setting>>,
+    /// The rows of each run that it does not hold for: single ones that were spoilt after the robot had driven by them.
     pub(crate) spoilt: Vec<Vec<usize>>,
 }
 
@@ -44,8 +44,15 @@ pub(crate) fn decision(runs: &[LoggedRun<'_>]) -> Decision {
     let declared: Vec<Controller> = runs.iter().map(|run| run.model.machine.controller).collect();
     let decided = decided(&declared, beyond_limit(runs), &found);
     let holds = matches!(decided, Decided::AsDeclared | Decided::Changed(_));
+    let without = |run: usize| -> Vec<Setting> {
+        let mut others = found.clone();
+        others[run] = None;
+        let changed = changed(&declared, &others);
+        changed.into_iter().map(|effect| effect.setting).collect()
+    };
     let spoilt = |run: Option<Constants>| run.filter(|_| holds).map_or_else(Vec::new, |run| run.spoilt);
     Decision {
+        without: (0..runs.len()).map(without).collect(),
         decided,
         spoilt: found.into_iter().map(spoilt).collect(),
     }
@@ -94,7 +101,7 @@ fn changed(declared: &[Controller], found: &[Option<Constants>]) -> Vec<Candidat
         let speed = declared.speed_m_s();
         Relative {
             line: run.speed_m_s.map(|v| v / speed),
-            error: SPEED_ROUNDING_M_S / speed * 0.05,
+            error: run.speed_error_m_s / speed,
         }
     });
     let candidates = [
@@ -134,16 +141,20 @@ fn candidate(name: &str, factors: &[Option<Relative>]) -> Option<Candidate> {
     const RUN_S: f64 = 300.0;
     const DRIFTS: f64 = 5e-3;
     let told: Vec<Relative> = factors.iter().flatten().copied().collect();
-    let first = told.first()?;
+    let best = *told.iter().min_by(|a, b| a.error.total_cmp(&b.error))?;
     let beyond = |value: f64, error: f64| value.abs() > SAME.max(4.0 * error);
     let slopes = told.iter().any(|run| run.line[1].abs() * RUN_S > DRIFTS);
     if !slopes && !told.iter().any(|run| beyond(run.line[0] - 1.0, run.error)) {
         return None;
     }
-    let mean = |i: usize| told.iter().map(|run| run.line[i]).sum::<f64>() / told.len() as f64;
+    let weight = |run: &Relative| run.error.max(f64::MIN_POSITIVE.sqrt()).powi(-2);
+    let weights: f64 = told.iter().map(weight).sum();
+    let mean = |i: usize| told.iter().map(|run| weight(run) * run.line[i]).sum::<f64>() / weights;
     let start = mean(0);
-    let differ = (told.iter()).any(|run| beyond(run.line[0] - first.line[0], 2.0 * run.error));
-    let error = told.iter().map(|run| run.error).fold(0.0, f64::max);
+    let differ =
+        (told.iter()).any(|run| beyond(run.line[0] - best.line[0], 2.0 * run.error.hypot(best.error)));
+    // What is rounded alike is off alike in all runs.
+    let error = best.error;
     let spec = find(name).ok()?;
     let (pattern, standard_errors) = if slopes {
         (

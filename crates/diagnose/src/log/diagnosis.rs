@@ -2,13 +2,14 @@
 
 use std::collections::BTreeMap;
 
-use sim::{Model, Pattern, Scene, Setting, Stage, find};
+use sim::{Model, Scene, Setting, Stage, find};
 
+use super::catalogue::Variant;
 use super::channels::Channel;
-use super::decide::{Decided, decision};
+use super::decide::{Decided, Decision, decision};
 use super::evidence::{Evidence, widened};
 use super::filter::MEASURED;
-use super::groups::unlisted_variants;
+use super::groups::{settling_variants, unlisted_variants};
 use super::implausible::{Implausible, take_out_spikes};
 use super::recut::recut;
 use super::refined::Refined;
@@ -17,7 +18,7 @@ use super::search::Search;
 use super::steps::{reading_step, written_step};
 use super::unnamed::Unnamed;
 use crate::answer::{ALTERNATIVE, indistinguishable};
-use crate::candidate::take_mean_of_others;
+use crate::candidate::stage_of;
 use crate::corners::{Corners, EXACT};
 use crate::{Answer, Candidate, Cause, Detectable, Error, Explanation, Verdict, Watch};
 
@@ -63,8 +64,8 @@ pub fn diagnose_logs(
     watch: &Watch<'_>,
 ) -> Result<LogDiagnosis, Error> {
     watch("the controller");
-    let decision = decision(runs);
-    let (decide, spoilt) = (decision.decided, decision.spoilt);
+    let mut decision = decision(runs);
+    let spoilt = std::mem::take(&mut decision.spoilt);
     let mut mended: Vec<Vec<LogRow>> = (runs.iter().zip(&spoilt))
         .map(|(run, spoilt)| without_logs(run.rows, spoilt))
         .collect();
@@ -93,7 +94,7 @@ pub fn diagnose_logs(
     let corners = |cut: &Option<(Corners, Scene)>| cut.as_ref().map_or(EXACT, |found| found.0);
     watch("each effect by the log");
     let Some(leads) = search.alone() else {
-        return Ok(search.answer(decide, spoilt, corners(&first)));
+        return Ok(search.answer(decision, spoilt, corners(&first)));
     };
     // Where walls or the robot then are elsewhere, so are the readings that no edge spoils.
     let clear = search.evidence.clear_with_each(search.rivals());
@@ -123,17 +124,22 @@ pub fn diagnose_logs(
     watch(&format!("what is beside {}", search.best_in_words()));
     if was_clear && corners(&again) == corners(&first) {
         search.finish(&leads);
-        return Ok(search.answer(decide, spoilt, corners(&first)));
+        return Ok(search.answer(decision, spoilt, corners(&first)));
     }
     let declared = declared.elsewhere(again.as_ref().map_or(&scene, |found| &found.1));
     let clear = declared.clear_with_each(search.rivals());
     let mut renewed = search.renewed(clear.unwrap_or(declared))?;
     renewed.finish(&leads);
-    Ok(renewed.answer(decide, spoilt, corners(&again)))
+    Ok(renewed.answer(decision, spoilt, corners(&again)))
 }
 
 impl Search<'_> {
-    fn answer(self, decide: Decided, spoilt: Spoilt, corners: Corners) -> LogDiagnosis {
+    fn answer(self, decision: Decision, spoilt: Spoilt, corners: Corners) -> LogDiagnosis {
+        let Decision {
+            decided: decide,
+            without,
+            ..
+        } = decision;
         let certain = self.certain(&decide);
         let is_certain = !certain.is_empty();
         let mut explanations: Vec<Explanation> = Vec::new();
@@ -181,7 +187,6 @@ impl Search<'_> {
             self.unnamed.as_ref().map(|unnamed| unnamed.cause.clone())
         };
         let indistinguishable = indistinguishable(explanations.iter(), ALTERNATIVE);
-        let runs = self.evidence.measured_runs;
         let mut answer = Answer {
             verdict,
             explanations,
@@ -189,7 +194,11 @@ impl Search<'_> {
             left_out: Vec::new(),
             cause,
         };
-        answer.left_out = self.without_each(runs, unnamed.or(self.found.first()), &answer);
+        answer.left_out = if !answer.settings().is_empty() {
+            self.without_each(without, unnamed.or(self.found.first()))
+        } else {
+            vec![Vec::new(); without.len()]
+        };
         LogDiagnosis {
             answer,
             decide,
@@ -208,17 +217,21 @@ impl Search<'_> {
             Decided::Changed(effects) => effects.clone(),
             _ => Vec::new(),
         };
-        certain.extend(self.rounding_counts.and_then(|counts| {
-            let spec = find("reading-step").ok()?;
-            Some(Candidate {
-                setting: Setting::constant(spec, [counts]),
-                standard_errors: vec![2e-4 * counts],
-                intervals: BTreeMap::new(),
-                gain: self.rounding_gain,
-                fitted: 1,
-            })
-        }));
+        certain.extend(self.rounding());
         certain
+    }
+
+    /// The multiples that readings were rounded to.
+    fn rounding(&self) -> Option<Candidate> {
+        let counts = self.rounding_counts?;
+        let spec = find("reading-step").ok()?;
+        Some(Candidate {
+            setting: Setting::constant(spec, [counts]),
+            standard_errors: vec![2e-4 * counts],
+            intervals: BTreeMap::new(),
+            gain: self.rounding_gain,
+            fitted: 1,
+        })
     }
 
     fn explanation(&self, refined: &Refined, certain: &[Candidate]) -> Explanation {
@@ -250,28 +263,26 @@ impl Search<'_> {
         left + (best - refined.gain).max(0.0)
     }
 
-    /// The answer's effects with sizes fitted to all runs but one, for each of so many runs.
-    fn without_each(&self, runs: usize, best: Option<&Refined>, answer: &Answer) -> Vec<Vec<Setting>> {
-        let whole = answer.settings();
-        let Some(best) = best.filter(|_| !whole.is_empty()) else {
-            return vec![whole; runs];
+    /// The answer's effects with sizes fitted to all runs but one, for each run: `best` beside the controller's constants `without` the
+    /// run.
+    fn without_each(&self, without: Vec<Vec<Setting>>, best: Option<&Refined>) -> Vec<Vec<Setting>> {
+        let stage = |setting: &Setting| stage_of(setting);
+        let settling = best.into_iter().flat_map(|best| &best.settings).map(stage);
+        let variants: Vec<Variant> = (self.variants.iter().cloned())
+            .chain(unlisted_variants())
+            .chain(settling.flat_map(settling_variants))
+            .collect();
+        let rounding: Vec<Setting> = self
+            .rounding()
+            .map(|rounding| rounding.setting)
+            .into_iter()
+            .collect();
+        let refitted = match best {
+            Some(best) => best.without_each(&self.evidence, &variants),
+            None => vec![Vec::new(); without.len()],
         };
-        let variants = [self.variants.as_slice(), &unlisted_variants()].concat();
-        let refitted = best.refit_without_each(&self.evidence, &variants, runs);
-        let certain = whole.len().saturating_sub(best.settings.len());
-        // What runs without a log have tells of all others.
-        let logged = self.evidence.runs();
-        let without = |(run, refitted): (usize, Vec<Setting>)| {
-            let mut settings = whole.clone();
-            settings.truncate(certain);
-            settings.extend(refitted);
-            for setting in &mut settings {
-                if let Pattern::ByRun(values) = &mut setting.pattern {
-                    take_mean_of_others(values, run, logged.iter().copied());
-                }
-            }
-            settings
-        };
-        refitted.into_iter().enumerate().map(without).collect()
+        (without.into_iter().zip(refitted))
+            .map(|(constants, refitted)| [constants, rounding.clone(), refitted].concat())
+            .collect()
     }
 }

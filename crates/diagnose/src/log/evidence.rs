@@ -177,8 +177,7 @@ impl<'a> Evidence<'a> {
 
     /// Time of a physics step, s, in the first of these runs.
     pub(crate) fn physics_step_s(&self) -> Option<f64> {
-        let rules = &self.models[self.stretches.first()?.run].run;
-        Some(rules.control_step_s / f64::from(rules.physics_steps))
+        Some(self.models[self.stretches.first()?.run].run.physics_step_s())
     }
 
     /// The part of the evidence that one run gives.
@@ -224,34 +223,34 @@ impl<'a> Evidence<'a> {
     /// The evidence of the readings that count with these effects too, if walls, or the robot, then are elsewhere: other rays
     /// come near the end of the range, and near edges.
     fn clear_with(&self, settings: &[Setting]) -> Option<Self> {
-        let narrower = |stretch: &Stretch<'a>| {
+        let narrowed = |stretch: &Stretch<'a>| {
             let (world, trace) = self.trace(stretch, settings)?;
             let (other, declared) = self.trace(stretch, &[])?;
-            if !reaches_elsewhere(&world, &other, &trace) && !leads_elsewhere(&trace, &declared) {
-                return None;
+            let mut own = stretch.clone();
+            let elsewhere = reaches_elsewhere(&world, &other, &trace) || leads_elsewhere(&trace, &declared);
+            if elsewhere {
+                let clear = clear_readings(&world, &trace, stretch.rows);
+                own.used = stretch.used.iter().zip(&clear).map(|(a, b)| a & b).collect();
             }
-            let clear = clear_readings(&world, &trace, stretch.rows);
-            let used = stretch.used.iter().zip(&clear).map(|(a, b)| a & b).collect();
-            Some(Stretch {
-                used,
-                ..stretch.clone()
-            })
+            Some((elsewhere, own))
         };
-        let stretches: Option<_> = self.stretches.par_iter().map(narrower).collect();
-        Some(Self {
-            stretches: stretches?,
-            ..*self
-        })
+        let narrowed: Vec<_> = (self.stretches.par_iter().map(narrowed)).collect::<Option<_>>()?;
+        let (elsewhere, stretches): (Vec<bool>, Vec<_>) = narrowed.into_iter().unzip();
+        elsewhere.contains(&true).then_some(Self { stretches, ..*self })
     }
 
     /// The log-likelihood with these effects added.
     pub(crate) fn likelihood(&self, settings: &[Setting]) -> Option<f64> {
+        Some(self.likelihoods(settings)?.iter().sum())
+    }
+
+    /// The same by stretch.
+    pub(crate) fn likelihoods(&self, settings: &[Setting]) -> Option<Vec<f64>> {
         let of_stretch = |stretch: &Stretch<'_>| {
             let world = self.world(settings, stretch.run).ok()?;
-            likelihood(&world, stretch.rows, Some(&stretch.used), self.step_counts)
+            likelihood(&world, stretch.rows, &stretch.used, self.step_counts)
         };
-        let parts: Option<Vec<f64>> = self.stretches.par_iter().map(of_stretch).collect();
-        Some(parts?.iter().sum())
+        self.stretches.par_iter().map(of_stretch).collect()
     }
 
     pub(crate) fn world(&self, settings: &[Setting], run: usize) -> Result<World<'a>, sim::Error> {

@@ -210,13 +210,8 @@ pub(crate) fn filter(
 }
 
 /// The log-likelihood of a stretch as [`filter`] finds it.
-pub(crate) fn likelihood(
-    world: &World<'_>,
-    rows: &[LogRow],
-    used: Option<&[Used]>,
-    step_counts: f64,
-) -> Option<f64> {
-    filtered(world, rows, used, step_counts, |_| ())
+pub(crate) fn likelihood(world: &World<'_>, rows: &[LogRow], used: &[Used], step_counts: f64) -> Option<f64> {
+    filtered(world, rows, Some(used), step_counts, |_| ())
 }
 
 /// Filters one stretch and gives each control step to `each`; the log-likelihood.

@@ -37,6 +37,7 @@ mod wheels;
 
 // The search through all that, and the answer.
 mod diagnosis;
+mod left_out;
 mod repeat;
 mod search;
 mod second;

@@ -1,5 +1,6 @@
 //! Effects on noise: judged by the log-likelihood alone, after everything that has a mean.
 
+use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 
 use sim::{Pattern, Setting, Spec, find};
@@ -136,6 +137,12 @@ impl Factor {
     /// breaks where it came to rest.
     fn round(&mut self, evidence: &Evidence<'_>, settings: &[Setting], base: f64) -> Option<ControlFlow<()>> {
         let (middle, half) = (self.middle, self.half);
+        let param = &self.spec.params[0];
+        let [lowest, highest] = [param.low, param.high].map(f64::ln);
+        if middle - half < lowest || middle + half > highest {
+            // At the end of the range.
+            return Some(ControlFlow::Break(()));
+        }
         let at = |log: f64| Some(self.at(evidence, settings, log)? - base);
         let (low, high) = (at(middle - half)?, at(middle + half)?);
         let slope = (high - low) / (2.0 * half);
@@ -145,6 +152,7 @@ impl Factor {
         } else {
             0.8 * slope.signum()
         };
+        let step = step.clamp(lowest - middle, highest - middle);
         // The best of the three is a start as good as the vertex of their parabola.
         let tried = [
             (middle + step, at(middle + step)?),
@@ -202,6 +210,7 @@ impl Factor {
             gain: self.gain,
             fitted: 1,
             by: By::Constant,
+            without: BTreeMap::new(),
         })
     }
 }
@@ -270,6 +279,7 @@ mod tests {
             gain: 100.0,
             fitted: 1,
             by: By::Constant,
+            without: BTreeMap::new(),
         };
         let twin = with_memory(&of(2.0)).unwrap();
         let Pattern::Constant(values) = &twin.settings[0].pattern else {

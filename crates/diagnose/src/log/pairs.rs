@@ -52,7 +52,11 @@ pub(crate) fn pairs(
 /// The best pairs of different names.
 fn diverse(sorted: Vec<Pair>, variants: &[Variant], most: usize) -> Vec<Pair> {
     let mut kept: Vec<Pair> = Vec::new();
-    let names = |pair: &Pair| pair.parts.each_ref().map(|(i, _)| variants[*i].spec.name);
+    let names = |pair: &Pair| {
+        let mut names = pair.parts.each_ref().map(|(i, _)| variants[*i].spec.name);
+        names.sort_unstable();
+        names
+    };
     for pair in sorted {
         if kept.len() < most && !kept.iter().any(|other| names(other) == names(&pair)) {
             kept.push(pair);

@@ -1,6 +1,6 @@
 //! Candidates with their best values.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use rayon::prelude::*;
 use sim::{Pattern, Setting};
@@ -22,6 +22,8 @@ pub(crate) struct Refined {
     pub(crate) gain: f64,
     pub(crate) fitted: usize,
     pub(crate) by: By,
+    /// Where the first of its sizes are put together of what each run tells: what they are without that of one.
+    pub(crate) without: BTreeMap<usize, Vec<Setting>>,
 }
 
 impl Refined {
@@ -63,26 +65,8 @@ impl Refined {
         }
     }
 
-    /// The settings fitted again without each of so many runs; those that jump or go by run stay.
-    pub(crate) fn refit_without_each(
-        &self,
-        evidence: &Evidence<'_>,
-        variants: &[Variant],
-        runs: usize,
-    ) -> Vec<Vec<Setting>> {
-        let knobs = self.knobs(variants);
-        let Some(now) = self.assessed(evidence, &knobs) else {
-            return vec![self.settings.clone(); runs];
-        };
-        let without = |run: usize| {
-            let others = evidence.without(run);
-            one_step(&others, &self.settings, &knobs, &now.without(run, evidence))
-        };
-        (0..runs).into_par_iter().map(without).collect()
-    }
-
     /// How well the settings explain the logs; `None` where nothing of them can be fitted.
-    fn assessed(&self, evidence: &Evidence<'_>, knobs: &[Knob]) -> Option<Assessment> {
+    pub(super) fn assessed(&self, evidence: &Evidence<'_>, knobs: &[Knob]) -> Option<Assessment> {
         (!knobs.is_empty())
             .then(|| evidence.assess(&self.settings, knobs))
             .flatten()
@@ -122,6 +106,7 @@ impl Refined {
         self.gain += first.gain;
         self.fitted += first.fitted;
         self.by = first.by;
+        self.without.clone_from(&first.without);
         self
     }
 }
@@ -194,15 +179,15 @@ fn refined(fitted: Fitted, base: f64, by: By) -> Refined {
         settings: fitted.settings,
         standard_errors,
         by,
+        without: BTreeMap::new(),
     }
 }
 
 /// The pattern's values, in the order of their standard errors; none where they go by run.
 fn numbers(setting: &Setting) -> Vec<f64> {
     match &setting.pattern {
-        Pattern::Constant(values) => values.clone(),
-        Pattern::ByTime { start, per_s } => [start.as_slice(), per_s].concat(),
         Pattern::ByRun(_) => Vec::new(),
+        pattern => pattern.numbers(),
     }
 }
 
@@ -240,11 +225,18 @@ fn by_runs(
         told[run] = (errors.iter().all(|error| error.is_finite())).then_some(OfRun { values, errors });
     }
     let (values, errors) = filled(&told)?;
+    let of = |values| Setting {
+        spec: variant.spec,
+        pattern: Pattern::ByRun(values),
+    };
+    let without = |run: usize| {
+        let mut others = told.clone();
+        others[run].take()?;
+        Some((run, vec![of(filled(&others)?.0)]))
+    };
     Some(Refined {
-        settings: vec![Setting {
-            spec: variant.spec,
-            pattern: Pattern::ByRun(values),
-        }],
+        without: (0..told.len()).filter_map(without).collect(),
+        settings: vec![of(values)],
         standard_errors: vec![errors],
         gain: parts.iter().map(|part| part.log_likelihood).sum::<f64>() - base.iter().sum::<f64>(),
         fitted: parts.iter().map(|part| part.knobs.len()).sum(),

@@ -14,7 +14,6 @@ pub(crate) fn reading_step(runs: &[&[LogRow]]) -> Option<f64> {
         .flatten()
         .copied()
         .filter(|&reading| reading > 0.0 && reading < 4000.0)
-        .take(40 * LOOKED_AT)
         .collect();
     let every = (readings.len() / LOOKED_AT).max(1);
     let some: Vec<f64> = readings.iter().copied().step_by(every).collect();

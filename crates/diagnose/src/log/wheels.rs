@@ -39,12 +39,20 @@ pub(crate) fn out_of_round(evidence: &Evidence<'_>, beside: &[Setting], worth: f
         together(&evidence, &parts, evidence.likelihood(&[])?, STEPS)
     };
     let fits: Vec<Refined> = (runs.par_iter().enumerate()).map(of_run).collect::<Option<_>>()?;
-    let (settings, standard_errors) = (shown.iter().enumerate())
-        .map(|(part, (variant, _))| over_runs(variant, &fits, part))
-        .unzip();
+    let of_fits = |fits: &[Refined]| -> (Vec<Setting>, Vec<Vec<f64>>) {
+        let of_part = |(part, (variant, _)): (usize, &(&Variant, Lead))| over_runs(variant, fits, part);
+        shown.iter().enumerate().map(of_part).unzip()
+    };
+    let without = |nth: usize| {
+        let mut others = fits.clone();
+        others.remove(nth);
+        (!others.is_empty()).then(|| (runs[nth], of_fits(&others).0))
+    };
+    let (settings, standard_errors) = of_fits(&fits);
     Some(Refined {
         settings,
         standard_errors,
+        without: (0..runs.len()).filter_map(without).collect(),
         gain: fits.iter().map(|fit| fit.gain).sum(),
         fitted: fits.iter().map(|fit| fit.fitted).sum(),
         by: By::Constant,
@@ -81,6 +89,8 @@ fn over_runs(variant: &Variant, fits: &[Refined], part: usize) -> (Setting, Vec<
 
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeMap;
+
     use super::*;
 
     #[test]
@@ -95,6 +105,7 @@ mod tests {
             gain: 100.0,
             fitted: 2,
             by: By::Constant,
+            without: BTreeMap::new(),
         };
         // Amplitudes .05, .05 and .08, the last one known half as well.
         let fits = [
