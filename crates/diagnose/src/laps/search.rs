@@ -289,7 +289,7 @@ impl Search<'_> {
     /// Effects with a wheel that is out of round, tried to the end.
     pub(super) fn out_of_round(&self, others: &Hypothesis, ripple: &Ripple) -> Vec<Found> {
         let start = others.with(&ripple.hypothesis(self.atlas()));
-        self.try_rounds(std::iter::once(&start), &ROUNDS_OF_GROUPS)
+        self.try_rounds(std::iter::once(&start), &ROUNDS_OF_SEVERAL)
     }
 
     pub(super) fn tell(&self, what: Arguments<'_>) {
