@@ -72,7 +72,7 @@ fn two_laps_are_too_few() {
             "--no-cache",
             "--quiet",
         ],
-        "run set/b has 2 whole laps after its first: at least 3 in every run are needed to trace anything; leave the \
+        "set/run_b.csv: 2 whole laps after the first: at least 3 in every run are needed to trace anything; leave the \
          run out of `runs` in dataset.toml, or measure it again",
     );
 }
@@ -329,7 +329,7 @@ fn sets_with_different_declarations_are_traced_together() {
     let gates = scratch.read("out/gates.csv");
     let rows: Vec<&str> = gates.lines().skip(1).collect();
     assert!(
-        rows.len() == 100 && rows.iter().all(|row| row.starts_with("reactive,")),
+        rows.len() == 100 && rows.iter().all(|row| row.starts_with("unseen,")),
         "{gates}"
     );
 }
@@ -375,7 +375,7 @@ fn logs_of_sets_with_different_declarations_are_used_together() {
     finer.record(&scratch, "finer");
     let (steps, _, remarks) = with(&["finer"]);
     assert_eq!(steps, alone);
-    let said = "The logs of finer (2 runs) are not used; they are declared with other walls, another body";
+    let said = "finer: 2 logs not used; they are declared with other walls, another body";
     assert!(remarks.to_string().contains(said), "{remarks}");
 }
 

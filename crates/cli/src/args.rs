@@ -295,7 +295,8 @@ pub(crate) struct Trace {
     /// have one for every run
     #[arg(long, required = true, value_name = "DIR")]
     pub(crate) measured: Vec<PathBuf>,
-    /// Data set that no fit sees, to measure the error on [default: each run is left out of the fit in turn]
+    /// Data set that no fit sees, to measure the error on; declared as one of the measured ones [default: each run is left
+    /// out of the fit in turn]
     #[arg(long, value_name = "DIR")]
     pub(crate) held_out: Option<PathBuf>,
     /// Folder for the report

@@ -87,6 +87,12 @@ impl SampledRun {
         }
     }
 
+    /// The name of its data set.
+    pub(crate) fn set(&self) -> &str {
+        let own = self.name.len() - self.run.len();
+        self.name[..own].trim_end_matches('/')
+    }
+
     /// Positions at the gates, laps x gates, m.
     pub(crate) fn offsets_m(&self) -> Vec<Vec<f64>> {
         self.laps.iter().map(|lap| lap.offsets_m.clone()).collect()

@@ -3,11 +3,15 @@
 use anyhow::{Context, Result};
 use diagnose::{
     Answer, Atlas, Baselines, Detectable, Explanation, FourNumbers, LogDiagnosis, LoggedRun, ObservedLap,
-    Simulate, Verdict, Watch, diagnose_logs,
+    Verdict, Watch, diagnose_logs,
 };
+use sim::{Pattern, Setting};
 
+use super::atlas::{Purpose, atlas};
+use super::cache::Cache;
 use super::logs::Logs;
-use super::recording::Recording;
+use super::recording::{Recording, Seeds, observed_laps, simulate_all};
+use crate::session::Session;
 
 /// An answer from logs beside what the laps make of it.
 #[derive(Debug)]
@@ -19,11 +23,12 @@ pub(crate) struct FromLogs {
     pub(crate) confirmed: bool,
 }
 
-/// The laps of a trace, and what simulates such.
+/// The laps of some recordings, and what the declared model leads one to expect of them.
 pub(super) struct TracedLaps<'a> {
-    pub(super) atlas: &'a Atlas,
-    pub(super) simulate: &'a Simulate<'a>,
-    pub(super) laps: &'a [Vec<ObservedLap>],
+    pub(super) atlas: Atlas,
+    recordings: Vec<&'a Recording>,
+    laps: Vec<Vec<ObservedLap>>,
+    seed: u64,
 }
 
 /// What is claimed, and why.
@@ -35,43 +40,85 @@ pub(super) struct Named {
     pub(super) detectable: Vec<Detectable>,
 }
 
-impl TracedLaps<'_> {
+impl<'a> TracedLaps<'a> {
+    /// # Errors
+    /// A run of which too few laps count, a declared model that does not complete its laps.
+    pub(super) fn new(
+        session: &Session,
+        recordings: Vec<&'a Recording>,
+        purpose: Purpose,
+        cache: &Cache,
+    ) -> Result<Self> {
+        Ok(Self {
+            laps: observed_laps(&recordings)?,
+            atlas: atlas(session, &recordings, purpose, cache)?,
+            recordings,
+            seed: session.seed(),
+        })
+    }
+
+    fn simulate(&self, effects: &[Setting], set: u64) -> Option<Vec<Vec<ObservedLap>>> {
+        let seeds = Seeds {
+            session: self.seed,
+            set,
+        };
+        simulate_all(&self.recordings, effects, seeds)
+    }
+
+    /// How the laps depart from the declared model, and from the model with these effects; the latter is `None` where the robot then
+    /// crashes.
+    fn confirm(&self, effects: &[Setting]) -> Result<(FourNumbers, Option<FourNumbers>)> {
+        let simulate = |effects: &[Setting], set: u64| self.simulate(effects, set);
+        Ok(self.atlas.confirm(&simulate, &self.laps, effects)?)
+    }
+
     /// What the laps say; `watch` is told what is being tried.
     pub(super) fn named(&self, watch: &Watch<'_>) -> Result<Named> {
-        let found = self.atlas.diagnose(self.simulate, self.laps, watch)?;
+        let simulate = |effects: &[Setting], set: u64| self.simulate(effects, set);
+        let found = self.atlas.diagnose(&simulate, &self.laps, watch)?;
         Ok(Named {
             residual: found.residual,
             answer: found.answer,
             from_logs: None,
-            baselines: Some(self.atlas.baselines(self.laps)?),
+            baselines: Some(self.atlas.baselines(&self.laps)?),
             detectable: self.atlas.detectable(),
         })
     }
 
-    /// What the robot's logs say, stage by stage, and what the laps make of it.
+    /// What the robot's logs say, stage by stage, and what the laps make of it; where sizes go by run, those of the `logged`
+    /// recordings alone if the laps of all contradict: of a run without a log no size is known.
     pub(super) fn named_by_logs(
         &self,
-        recordings: &[Recording],
         logs: &Logs,
+        logged: impl FnOnce() -> Result<Self>,
         watch: &Watch<'_>,
     ) -> Result<Named> {
-        let models = (recordings.iter())
-            .flat_map(|recording| recording.measured.runs.iter().map(|_| &recording.setup.model));
+        let models = (self.recordings.iter()).flat_map(|recording| {
+            let model = &recording.setup.model;
+            recording.measured.runs.iter().map(move |_| model)
+        });
         let runs: Vec<LoggedRun<'_>> = (models.zip(&logs.runs))
             .map(|(model, rows)| LoggedRun { model, rows })
             .collect();
-        let first = &recordings[logs.recordings[0]];
-        let logs = diagnose_logs(&first.setup.scene, &runs, watch)
+        let first = self.recordings[logs.recordings[0]];
+        let found = diagnose_logs(&first.setup.scene, &runs, watch)
             .with_context(|| first.measured.set.name.clone())?;
         watch("whether the laps agree");
-        let (before, after) = (self.atlas).confirm(self.simulate, self.laps, &logs.answer.settings())?;
+        let settings = found.answer.settings();
+        let (residual, after) = self.confirm(&settings)?;
+        let mut confirmed = found.answer.agrees_with(&residual, after.as_ref());
+        let goes_by_run = (settings.iter()).any(|setting| matches!(setting.pattern, Pattern::ByRun(_)));
+        if !confirmed && goes_by_run && logs.recordings.len() < self.recordings.len() {
+            let (before, after) = logged()?.confirm(&settings)?;
+            confirmed = found.answer.agrees_with(&before, after.as_ref());
+        }
         let found = FromLogs {
-            confirmed: logs.answer.agrees_with(&before, after.as_ref()),
-            logs,
+            confirmed,
+            logs: found,
             after,
         };
         Ok(Named {
-            residual: before,
+            residual,
             answer: found.answer(),
             baselines: None,
             detectable: found.logs.detectable.clone(),

@@ -54,15 +54,15 @@ impl Purpose {
     }
 }
 
-/// The atlas of all recordings.
+/// The atlas of some recordings together.
 pub(super) fn atlas(
     session: &Session,
-    recordings: &[Recording],
+    recordings: &[&Recording],
     purpose: Purpose,
     cache: &Cache,
 ) -> Result<Atlas> {
     let physics_step_s = recordings[0].setup.model.run.physics_step_s();
-    let of = |recording| atlas_of(session, recording, (purpose, physics_step_s), cache);
+    let of = |recording: &&Recording| atlas_of(session, recording, (purpose, physics_step_s), cache);
     let parts = recordings.iter().map(of).collect::<Result<Vec<_>>>()?;
     Ok(Atlas::join(parts).expect("at least one data set is measured"))
 }

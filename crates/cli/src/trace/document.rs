@@ -72,7 +72,7 @@ fn logs(found: &FromLogs) -> Value {
     let (decide, effects, share) = match &logs.decide {
         Decided::AsDeclared => ("as declared", Vec::new(), None),
         Decided::Changed(effects) => ("changed", effects.iter().map(one_effect).collect(), None),
-        Decided::NoController { share } => ("no controller of this kind", Vec::new(), Some(*share)),
+        Decided::NoController { share, .. } => ("no controller of this kind", Vec::new(), Some(*share)),
         Decided::Unknown => ("unknown", Vec::new(), None),
     };
     json!({
@@ -187,10 +187,15 @@ fn by(effect: &Candidate) -> Value {
 pub(crate) fn parameters(effect: &Candidate) -> Vec<Value> {
     let params = effect.setting.spec.params;
     let entry = |param: &sim::Param, name: String, value: Value, low: Value, high: Value| {
-        let choice = value.as_f64().and_then(|v| param.choices.get(v as usize));
-        let value = match (choice, param.neutral) {
-            (Some(choice), None) => json!(choice),
-            _ => value,
+        let named = |value: &Value| {
+            let choice = value.as_f64().and_then(|v| param.choices.get(v as usize));
+            choice
+                .filter(|_| param.neutral.is_none())
+                .map_or_else(|| value.clone(), |choice| json!(choice))
+        };
+        let value = match &value {
+            Value::Array(runs) => runs.iter().map(named).collect(),
+            _ => named(&value),
         };
         json!({ "name": name, "value": value, "unit": param.unit, "low": low, "high": high })
     };

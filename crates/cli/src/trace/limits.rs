@@ -7,11 +7,12 @@ use sim::Param;
 
 use super::Trace;
 use super::next::{Experiment, MOST_LAPS};
+use super::recording::{Recording, files, runs};
 use crate::experiments::Block;
 use crate::table::{Table, far_from, probability};
 
-/// What the logged commands say of the controller.
-pub(super) fn decide_in_words(decide: &Decided) -> String {
+/// What the logged commands of some recordings say of the controller.
+pub(super) fn decide_in_words(decide: &Decided, recordings: &[Recording]) -> String {
     match decide {
         Decided::AsDeclared => {
             "The declared controller gives every logged command from the logged readings.".to_owned()
@@ -20,11 +21,24 @@ pub(super) fn decide_in_words(decide: &Decided) -> String {
             "The logged commands follow from the logged readings with another constant: {}.",
             effects.iter().map(|e| e.label()).collect::<Vec<_>>().join(", ")
         ),
-        Decided::NoController { share } => format!(
-            "No controller of this kind gives {:.1} % of the logged commands from the logged readings: look at the units (readings in \
-             counts, speeds in m/s), at how they are rounded or cut, and at the controller.",
-            100.0 * share
-        ),
+        Decided::NoController { share, runs: wrong } => {
+            let logged = files(recordings).filter(|run| run.rows.log.is_some()).count();
+            let names = runs(recordings)
+                .enumerate()
+                .filter(|(run, _)| wrong.contains(run));
+            let names: Vec<&str> = names.map(|(_, run)| run.name.as_str()).collect();
+            let of = if wrong.len() < logged {
+                format!(" of run {}", names.join(", "))
+            } else {
+                String::new()
+            };
+            format!(
+                "No controller of this kind gives {:.1} % of the logged commands{of} from the logged readings: look at the units \
+                 (readings in counts, speeds in m/s), at how they are rounded or cut, at the order of the columns, and at the \
+                 controller.",
+                100.0 * share
+            )
+        }
         Decided::Unknown => "No control step has both readings and commands.".to_owned(),
     }
 }
@@ -152,7 +166,7 @@ pub(super) fn stages(trace: &Trace) -> Vec<Block> {
         )];
     };
     let logs = &found.logs;
-    let decide = decide_in_words(&logs.decide);
+    let decide = decide_in_words(&logs.decide, &trace.recordings);
     let agree = if found.confirmed {
         "The laps agree."
     } else {

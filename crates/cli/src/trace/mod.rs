@@ -19,10 +19,9 @@ use std::path::Path;
 
 use anyhow::Result;
 use diagnose::{Answer, Baselines, Decided, Detectable, FourNumbers};
-use sim::Setting;
 
 use answer::{FromLogs, TracedLaps};
-use atlas::{Purpose, atlas, laps_simulated};
+use atlas::{Purpose, laps_simulated};
 pub(crate) use cache::Cache;
 pub(crate) use document::{document, parameters};
 pub(crate) use errors::Errors;
@@ -31,7 +30,7 @@ use limits::decide_in_words;
 use logs::{Logs, unused_in_words};
 use next::{Experiment, experiments};
 pub(crate) use pages::{digest, gates_csv, sections, summary};
-use recording::{HeldOut, Recording, Seeds, observed_laps, simulate_all};
+use recording::{HeldOut, Recording};
 use remarks::remarks;
 
 use crate::config::{Config, ModelFile};
@@ -93,9 +92,6 @@ impl Trace {
             .map(|set| HeldOut::new(&recordings, file, set))
             .transpose()?;
         let seed = session.seed();
-        let simulate =
-            |effects: &[Setting], set: u64| simulate_all(&recordings, effects, Seeds { session: seed, set });
-        let laps = observed_laps(&recordings)?;
         let logged = Logs::of(&recordings);
         let mut remarks = remarks(&recordings, logged.as_ref());
         let held_out_runs = held_out.iter().flat_map(|held_out| &held_out.runs);
@@ -106,16 +102,17 @@ impl Trace {
         } else {
             Purpose::Name
         };
-        let atlas = atlas(session, &recordings, purpose, cache)?;
+        let traced = TracedLaps::new(session, recordings.iter().collect(), purpose, cache)?;
         let progress = session.open_progress("naming the effect");
         let watch = |what: &str| progress.message(&format!("naming the effect: {what}"));
-        let traced = TracedLaps {
-            atlas: &atlas,
-            simulate: &simulate,
-            laps: &laps,
-        };
         let named = match &logged {
-            Some(logs) => traced.named_by_logs(&recordings, logs, &watch),
+            Some(logs) => {
+                let logged = || {
+                    let logged = logs.recordings.iter().map(|&number| &recordings[number]);
+                    TracedLaps::new(session, logged.collect(), purpose, cache)
+                };
+                traced.named_by_logs(logs, logged, &watch)
+            }
             None => traced.named(&watch),
         };
         interrupt::check()?;
@@ -127,12 +124,13 @@ impl Trace {
         if let (Some(found), Some(logs)) = (&named.from_logs, &logged) {
             remarks.extend(unused_in_words(&recordings, logs, &found.logs));
             if matches!(found.logs.decide, Decided::NoController { .. }) {
-                remarks.push(decide_in_words(&found.logs.decide));
+                remarks.push(decide_in_words(&found.logs.decide, &recordings));
             }
         }
+        let laps_simulated = laps_simulated(&recordings, &traced.atlas, purpose);
         let mut trace = Self {
             remarks,
-            laps_simulated: laps_simulated(&recordings, &atlas, purpose),
+            laps_simulated,
             experiments: Vec::new(),
             recordings,
             errors,

@@ -128,7 +128,10 @@ fn unexplained(trace: &Trace) -> String {
     if let Some(found) = &trace.from_logs
         && matches!(found.logs.decide, Decided::NoController { .. })
     {
-        return format!("Unexplained: {}", decide_in_words(&found.logs.decide));
+        return format!(
+            "Unexplained: {}",
+            decide_in_words(&found.logs.decide, &trace.recordings)
+        );
     }
     let known = trace.answer.cause.as_ref().map(|cause| {
         let stage = cause.stage.name();
@@ -148,9 +151,9 @@ pub(crate) fn gates_csv(trace: &Trace) -> String {
     let mut csv = String::from("data_set,gate,measured_m,before_m,after_m\n");
     for errors in &trace.errors {
         let laps: Vec<Vec<f64>> = errors.held_out.iter().flat_map(SampledRun::offsets_m).collect();
+        let name = errors.held_out.first().map_or("", SampledRun::set);
         for (gate, measured) in mean_lap(&laps).unwrap_or_default().iter().enumerate() {
             let (before, after) = (errors.before.mean_m()[gate], errors.after.mean_m()[gate]);
-            let name = &trace.recordings[errors.recording].measured.set.name;
             csv += &format!("{name},{gate},{measured:.6},{before:.6},{after:.6}\n");
         }
     }
@@ -296,12 +299,15 @@ fn residual(trace: &Trace) -> Vec<Block> {
         let row = [name.to_owned(), declared.freedom.to_string()];
         table.push(row.into_iter().chain(shown(declared)).chain(left));
     }
+    let of = of_shown(trace);
     vec![
         Block::Table(table),
         Picture::block(
             "residual_map",
             "Fig. A",
-            "Where the residual sits: the mean measured lap, coloured by its distance from the declared model's.",
+            format!(
+                "Where the residual sits: the mean measured lap{of}, coloured by its distance from the declared model's."
+            ),
             pictures::residual_map(trace),
         ),
     ]
@@ -363,19 +369,33 @@ fn sizes(explanation: &Explanation) -> String {
     }
 }
 
+/// Whose laps are drawn, for a caption, where there are several data sets.
+fn of_shown(trace: &Trace) -> String {
+    match trace.recordings.len() {
+        1 => String::new(),
+        _ => format!(
+            " of {} (all data sets: gates.csv)",
+            trace.shown().0.measured.set.name
+        ),
+    }
+}
+
 fn before_and_after(trace: &Trace) -> Vec<Block> {
+    let of = of_shown(trace);
     vec![
         Picture::block(
             "mean_laps",
             "Fig. B",
-            "Mean position at each gate: measured, simulated with the declared model, and with the answer. Below, what each of the \
-             two leaves of the measured mean lap; in the band, 95 of 100 gates lie by chance.",
+            format!(
+                "Mean position at each gate: measured, simulated with the declared model, and with the answer{of}. Below, what each of \
+                 the two leaves of the measured mean lap; in the band, 95 of 100 gates lie by chance."
+            ),
             pictures::mean_laps(trace),
         ),
         Picture::block(
             "laps",
             "Fig. C",
-            "Laps of the declared model and with the answer, over measured ones.",
+            format!("Laps of the declared model and with the answer, over measured ones{of}."),
             pictures::laps(trace),
         ),
     ]

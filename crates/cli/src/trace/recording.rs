@@ -82,8 +82,14 @@ impl Recording {
         sets: Vec<DataSet>,
     ) -> Result<Vec<Self>> {
         let mut recordings: Vec<Self> = Vec::with_capacity(sets.len());
-        for set in sets {
-            let first_run = runs(&recordings).count();
+        for mut set in sets {
+            let (first_run, name) = (runs(&recordings).count(), set.name.clone());
+            for number in 2.. {
+                if recordings.iter().all(|other| other.measured.set.name != set.name) {
+                    break;
+                }
+                set.name = format!("{name} ({number})");
+            }
             let next = Self::new(session, file, world, set, first_run)?;
             if let Some(first) = recordings.first() {
                 let [all, own] = [first, &next].map(|recording| recording.config.run.gates);
@@ -126,6 +132,11 @@ impl Recording {
         let written_m = coarse_unit_m(positions.flatten().copied());
         setup.see_in_steps(written_m);
         is_timed(&measured, &setup)?;
+        // An effect of the model may have too few values by run.
+        for run in first_run..first_run + measured.runs.len() {
+            let world = setup.scene.world(&setup.model, run);
+            world.map_err(|error| setup::locate(file, &source, error))?;
+        }
         let cuts = diagnose::other_cuts(&setup.scene, &setup.model)
             .into_iter()
             .map(|scene| Setup {
@@ -283,9 +294,9 @@ impl Seeds {
     }
 }
 
-/// One simulated data set of the shape of all recordings together.
+/// One simulated data set of the shape of some recordings together.
 pub(super) fn simulate_all(
-    recordings: &[Recording],
+    recordings: &[&Recording],
     effects: &[Setting],
     seeds: Seeds,
 ) -> Option<Vec<Vec<ObservedLap>>> {
@@ -352,20 +363,23 @@ pub(super) fn files(recordings: &[Recording]) -> impl Iterator<Item = &RunFile> 
         .flat_map(|recording| &recording.measured.set.runs)
 }
 
-/// The laps of every run of all recordings.
+/// The laps of every run of some recordings.
 ///
 /// # Errors
 /// A run of which too few laps count.
-pub(super) fn observed_laps(recordings: &[Recording]) -> Result<Vec<Vec<ObservedLap>>> {
-    let laps: Vec<Vec<ObservedLap>> = recordings.iter().flat_map(Recording::laps).collect();
-    for (run, laps) in runs(recordings).zip(&laps) {
+pub(super) fn observed_laps(recordings: &[&Recording]) -> Result<Vec<Vec<ObservedLap>>> {
+    let laps: Vec<Vec<ObservedLap>> = recordings.iter().flat_map(|recording| recording.laps()).collect();
+    let measured = || recordings.iter().map(|recording| &recording.measured);
+    let files = measured().flat_map(|measured| &measured.set.runs);
+    let runs = measured().flat_map(|measured| &measured.runs);
+    for ((run, file), laps) in runs.zip(files).zip(&laps) {
         ensure!(
             laps.len() >= 3,
-            "run {} has {} whole laps after its first: at least 3 in every run are needed to trace anything; {}",
-            run.name,
+            "{}: {} whole laps after the first: at least 3 in every run are needed to trace anything; {}",
+            file.path.display(),
             laps.len(),
             if run.wanted < 3 {
-                "raise `laps` in dataset.toml"
+                "raise `laps` in dataset.toml if there are more, or measure longer"
             } else {
                 "leave the run out of `runs` in dataset.toml, or measure it again"
             }

@@ -86,8 +86,12 @@ pub(super) fn remarks(recordings: &[Recording], logged: Option<&Logs>) -> Vec<St
                      the camera saw the robot"
                 }
             };
+            let logs = if count == 1 { "log" } else { "logs" };
+            remarks.push(format!("{}: {count} {logs} not used; {why}.", set.name));
+        }
+        if let ([_, ..], 0) = (used, count) {
             remarks.push(format!(
-                "The logs of {} ({count} runs) are not used; {why}.",
+                "{} has no logs: its laps judge what the other data sets' logs say.",
                 set.name
             ));
         }

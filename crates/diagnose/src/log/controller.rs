@@ -104,7 +104,7 @@ pub(crate) fn constants_by_run(runs: &[LoggedRun<'_>]) -> Vec<Option<Constants>>
 }
 
 /// The largest share of a run's choices that its constants do not explain.
-pub(crate) fn most_missed(runs: &[Option<Constants>]) -> f64 {
+fn most_missed(runs: &[Option<Constants>]) -> f64 {
     runs.iter().flatten().map(|run| run.missed).fold(0.0, f64::max)
 }
 
@@ -127,13 +127,17 @@ fn written_m_s(choices: &[Choice]) -> f64 {
 
 fn choices(model: &Model, rows: &[LogRow]) -> Vec<Choice> {
     let limit_m_s = model.machine.robot.wheel_speed_limit_m_s - AT_LIMIT_M_S;
-    (rows.iter().enumerate().filter(|(_, logged)| logged.commands()))
-        .filter_map(|(row, logged)| logged.read().map(|readings| (row, logged, readings)))
-        .map(|(row, logged, s)| Choice {
+    let decides = |logged: &LogRow| {
+        // The controllers do not look behind.
+        let (right, left) = (&logged.readings[..3], &logged.readings[5..]);
+        logged.commands() && right.iter().chain(left).all(|reading| reading.is_finite())
+    };
+    (rows.iter().enumerate().filter(|(_, logged)| decides(logged)))
+        .map(|(row, logged)| Choice {
             row,
             time_s: logged.time_s,
-            right_counts: s[0] + s[1] + s[2],
-            left_counts: s[5] + s[6] + s[7],
+            right_counts: logged.readings[..3].iter().sum(),
+            left_counts: logged.readings[5..].iter().sum(),
             left_m_s: logged.command.left_m_s,
             right_m_s: logged.command.right_m_s,
         })

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use sim::{Controller, Pattern, Setting, find};
 
-use super::controller::{AT_LIMIT_M_S, Constants, FORGIVEN, Line, constants_by_run, most_missed};
+use super::controller::{AT_LIMIT_M_S, Constants, FORGIVEN, Line, constants_by_run};
 use super::rows::LoggedRun;
 use crate::Candidate;
 use crate::candidate::{OfRun, filled};
@@ -18,8 +18,10 @@ pub enum Decided {
     Changed(Vec<Candidate>),
     /// No controller of this kind gives them: a wrong unit, another controller, or an effect that has no name.
     NoController {
-        /// Share of the control steps that the best constants do not explain.
+        /// Share of the control steps that the best constants do not explain, of the run in which that is most.
         share: f64,
+        /// The runs in which it is too much.
+        runs: Vec<usize>,
     },
     /// No control step has both readings and commands.
     Unknown,
@@ -42,7 +44,8 @@ pub(crate) struct Decision {
 pub(crate) fn decision(runs: &[LoggedRun<'_>]) -> Decision {
     let found = constants_by_run(runs);
     let declared: Vec<Controller> = runs.iter().map(|run| run.model.machine.controller).collect();
-    let decided = decided(&declared, beyond_limit(runs), &found);
+    let beyond: Vec<f64> = runs.iter().map(beyond_limit).collect();
+    let decided = no_controller(&beyond).unwrap_or_else(|| decided(&declared, &found));
     let holds = matches!(decided, Decided::AsDeclared | Decided::Changed(_));
     let without = |run: usize| -> Vec<Setting> {
         let mut others = found.clone();
@@ -58,24 +61,32 @@ pub(crate) fn decision(runs: &[LoggedRun<'_>]) -> Decision {
     }
 }
 
-/// The verdict on runs whose declared controllers are these, if that share of the commands is beyond what wheels can do.
-fn decided(declared: &[Controller], beyond: f64, found: &[Option<Constants>]) -> Decided {
-    if beyond > FORGIVEN {
-        return Decided::NoController { share: beyond };
-    }
+/// That no controller gives the commands of runs of which it misses these shares; `None` if it misses hardly any.
+fn no_controller(missed: &[f64]) -> Option<Decided> {
+    let share = missed.iter().copied().fold(0.0, f64::max);
+    let runs = (0..missed.len()).filter(|&run| missed[run] > FORGIVEN).collect();
+    (share > FORGIVEN).then_some(Decided::NoController { share, runs })
+}
+
+/// The verdict on runs whose declared controllers are these.
+fn decided(declared: &[Controller], found: &[Option<Constants>]) -> Decided {
     if found.iter().all(Option::is_none) {
         return Decided::Unknown;
     }
-    let share = most_missed(found);
-    if share > FORGIVEN {
-        return Decided::NoController { share };
+    let missed = |run: &Option<Constants>| run.as_ref().map_or(0.0, |run| run.missed);
+    let missed: Vec<f64> = found.iter().map(missed).collect();
+    if let Some(none) = no_controller(&missed) {
+        return none;
     }
     let changed = changed(declared, found);
     let in_range = |candidate: &Candidate| candidate.setting.check(0).is_ok();
     match changed.is_empty() {
         true => Decided::AsDeclared,
         // A gain or a speed a thousand times as large is another unit.
-        false if !changed.iter().all(in_range) => Decided::NoController { share: 1.0 },
+        false if !changed.iter().all(in_range) => Decided::NoController {
+            share: 1.0,
+            runs: (0..found.len()).filter(|&run| found[run].is_some()).collect(),
+        },
         false => Decided::Changed(changed),
     }
 }
@@ -111,16 +122,14 @@ fn changed(declared: &[Controller], found: &[Option<Constants>]) -> Vec<Candidat
     candidates.into_iter().flatten().collect()
 }
 
-/// Share of the commands beyond the wheels' limit, to which every controller's commands are cut.
-fn beyond_limit(runs: &[LoggedRun<'_>]) -> f64 {
+/// Share of a run's commands beyond the wheels' limit, to which every controller's commands are cut.
+fn beyond_limit(LoggedRun { model, rows }: &LoggedRun<'_>) -> f64 {
+    let limit_m_s = model.machine.robot.wheel_speed_limit_m_s + AT_LIMIT_M_S;
     let (mut all, mut beyond) = (0.0_f64, 0.0);
-    for LoggedRun { model, rows } in runs {
-        let limit_m_s = model.machine.robot.wheel_speed_limit_m_s + AT_LIMIT_M_S;
-        for row in rows.iter().filter(|row| row.commands()) {
-            all += 1.0;
-            if row.command.left_m_s.abs().max(row.command.right_m_s.abs()) > limit_m_s {
-                beyond += 1.0;
-            }
+    for row in rows.iter().filter(|row| row.commands()) {
+        all += 1.0;
+        if row.command.left_m_s.abs().max(row.command.right_m_s.abs()) > limit_m_s {
+            beyond += 1.0;
         }
     }
     beyond / all.max(1.0)

@@ -69,11 +69,13 @@ pub fn diagnose_logs(
     let mut mended: Vec<Vec<LogRow>> = (runs.iter().zip(&spoilt))
         .map(|(run, spoilt)| without_logs(run.rows, spoilt))
         .collect();
+    let models: Vec<&Model> = runs.iter().map(|run| run.model).collect();
+    let at_end = |model: &&Model| model.machine.response.reading(model.machine.range_m);
+    let edge_counts = models.iter().map(at_end).fold(0.0, f64::max);
     let spoilt = Spoilt {
         rows: spoilt,
-        readings: take_out_spikes(&mut mended),
+        readings: take_out_spikes(&mut mended, edge_counts),
     };
-    let models: Vec<&Model> = runs.iter().map(|run| run.model).collect();
     let mended: Vec<Vec<LogRow>> = (mended.iter().zip(&models))
         .map(|(rows, model)| bridged(rows, &model.run))
         .collect();

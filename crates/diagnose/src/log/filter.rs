@@ -189,6 +189,9 @@ fn carried(p: &PoseMatrix, turned: Vec2) -> PoseMatrix {
     std::array::from_fn(|i| std::array::from_fn(|j| half[i][j] + half[i][2] * arm[j]))
 }
 
+/// Standard deviation below which a reading is exact, counts, and no likelihood weighs it: they are written to 0.1 counts.
+const EXACT_COUNTS: f64 = 0.03;
+
 /// Control steps at the beginning that do not count: the start pose was fitted to them.
 const BURN_IN: usize = 48;
 
@@ -254,12 +257,13 @@ fn filtered(
 /// What a row has; readings do not guide the very first steps, where the heading is a guess.
 fn available(row: &LogRow, index: usize) -> Used {
     let camera = if row.observed.is_some() { 0b11 } else { 0 };
-    let readings = if row.read().is_some() && index >= BURN_IN / 3 {
-        0b11_1111_1100
-    } else {
-        0
-    };
-    camera | readings
+    if index < BURN_IN / 3 {
+        return camera;
+    }
+    let finite = |lane: &usize| row.readings[*lane].is_finite();
+    (0..8)
+        .filter(finite)
+        .fold(camera, |used, lane| used | 1 << (lane + 2))
 }
 
 /// One control step.
@@ -390,6 +394,10 @@ fn sense(
             .sum();
         let own_variance = noise.deviation(mean).powi(2) + outlook.edge_variance[lane];
         let deviation = (own_variance + pose_variance).sqrt();
+        if deviation < EXACT_COUNTS {
+            instant.used &= !(1 << m);
+            continue;
+        }
         let read = cut(
             mean,
             deviation,

@@ -26,11 +26,13 @@ pub fn take_out_implausible(rows: &mut [LogRow], model: &Model) -> Vec<Implausib
 
 /// Takes readings that leap away for a few rows out of the logs of runs, and says which, run by run. Of the two sensors behind, that
 /// is: what spoils a reading of the others shows in a command that does not follow from it, and such rows have no readings any more
-/// here. What still leaps in these others was read by the robot, which then read what leaps behind it too.
-pub(crate) fn take_out_spikes(runs: &mut [Vec<LogRow>]) -> Vec<Vec<Implausible>> {
+/// here. What still leaps in these others was read by the robot, which then read what leaps behind it too. `edge_counts` is what a
+/// reading leaps by at the end of the range.
+pub(crate) fn take_out_spikes(runs: &mut [Vec<LogRow>], edge_counts: f64) -> Vec<Vec<Implausible>> {
     const BEHIND: [usize; 2] = [3, 4];
     /// Leaps that may have been spoilt all the same, as a rule does not tell all sums apart.
     const UNTOLD: usize = 2;
+    let spikes = |rows: &[LogRow], sensor: usize| spikes(rows, sensor, edge_counts);
     let leaps = |sensor: usize| runs.iter().map(|rows| spikes(rows, sensor).len()).sum::<usize>();
     let read: usize = (0..8).filter(|sensor| !BEHIND.contains(sensor)).map(leaps).sum();
     if read > UNTOLD {
@@ -85,11 +87,13 @@ fn out_of_range(rows: &[LogRow], model: &Model) -> Vec<Implausible> {
 }
 
 /// Readings of one sensor that leap away for a few rows, much farther from the median of those about them than others do.
-fn spikes(rows: &[LogRow], sensor: usize) -> Vec<Implausible> {
+fn spikes(rows: &[LogRow], sensor: usize, edge_counts: f64) -> Vec<Implausible> {
     /// Rows to either side of which the median is taken: what lasts no longer is a spike.
     const REACH: usize = 4;
     /// What is no spike in any case, counts.
     const LEAST_COUNTS: f64 = 200.0;
+    /// Times as much as a reading leaps by at the end of the range, with its noise.
+    const EDGES: f64 = 1.5;
     let reading = |row: usize| rows[row].readings[sensor];
     let places: Vec<usize> = (0..rows.len()).filter(|&row| reading(row).is_finite()).collect();
     let leap = |at: usize| {
@@ -97,7 +101,7 @@ fn spikes(rows: &[LogRow], sensor: usize) -> Vec<Implausible> {
         (reading(places[at]) - median(about.map(|at| reading(places[at])))).abs()
     };
     let leaps: Vec<f64> = (0..places.len()).map(leap).collect();
-    let far = far(&leaps, LEAST_COUNTS);
+    let far = far(&leaps, LEAST_COUNTS.max(EDGES * edge_counts));
     (places.iter().zip(leaps))
         .filter(|(_, leap)| *leap > far)
         .map(|(&row, _)| Implausible {
@@ -152,9 +156,14 @@ mod tests {
     fn readings_that_leap_away_for_a_few_rows_are_spikes_and_edges_and_noise_are_none() {
         for noise_counts in [0.0, 10.0, 150.0] {
             let mut log = rows(noise_counts);
-            assert_eq!((0..8).map(|sensor| spikes(&log, sensor).len()).sum::<usize>(), 0);
+            assert_eq!(
+                (0..8)
+                    .map(|sensor| spikes(&log, sensor, 0.0).len())
+                    .sum::<usize>(),
+                0
+            );
             (1234..1237).for_each(|row| log[row].readings[4] = 3900.0);
-            let found = spikes(&log, 4);
+            let found = spikes(&log, 4, 0.0);
             let found = taken_out(&mut log, found);
             let expected = |row| Implausible {
                 row,
@@ -173,10 +182,10 @@ mod tests {
         };
         let mut runs = [rows(10.0), rows(20.0)];
         spoil(&mut runs[1], 3, 8);
-        let found = take_out_spikes(&mut runs.clone());
+        let found = take_out_spikes(&mut runs.clone(), 0.0);
         assert_eq!((found[0].len(), found[1].len()), (0, 8));
         spoil(&mut runs[0], 6, 8);
-        let found = take_out_spikes(&mut runs);
+        let found = take_out_spikes(&mut runs, 0.0);
         assert_eq!(found, [[], []]);
     }
 
@@ -185,7 +194,7 @@ mod tests {
         let mut log = rows(10.0);
         (0..50).for_each(|i| log[50 + 77 * i].readings[4] += 2500.0);
         let before = log.clone();
-        let found = spikes(&log, 4);
+        let found = spikes(&log, 4, 0.0);
         assert_eq!((found.len(), taken_out(&mut log, found)), (50, Vec::new()));
         assert_eq!(log, before);
     }

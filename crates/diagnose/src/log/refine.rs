@@ -130,11 +130,14 @@ fn trials<'a>(
 
 fn fitted(settings: Vec<Setting>, knobs: Vec<Knob>, now: Assessment) -> Fitted {
     let (left, _) = pooled(&now, knobs.len());
-    let covariance = left.clone().cholesky().map(|factor| factor.inverse());
+    // What changes nothing is not known, and leaves the others as they are: the direction of a light that is out.
+    let told: Vec<usize> = (0..knobs.len()).filter(|&i| left[(i, i)] > 0.0).collect();
+    let of_told = DMatrix::from_fn(told.len(), told.len(), |a, b| left[(told[a], told[b])]);
+    let covariance = of_told.cholesky().map(|factor| factor.inverse());
     let error = |i: usize| {
-        covariance
-            .as_ref()
-            .map_or(f64::INFINITY, |c| c[(i, i)].sqrt() * knobs[i].step)
+        let place = told.iter().position(|&other| other == i);
+        let variance = covariance.as_ref().zip(place).map(|(c, place)| c[(place, place)]);
+        variance.map_or(f64::INFINITY, |variance| variance.sqrt() * knobs[i].step)
     };
     Fitted {
         standard_errors: (0..knobs.len()).map(error).collect(),

@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use rayon::prelude::*;
 use sim::{Pattern, Setting};
+use statrs::statistics::Statistics;
 
 use super::catalogue::Variant;
 use super::evidence::{Assessment, Evidence, Knob};
@@ -218,12 +219,15 @@ fn by_runs(
     parts: &[Fitted],
     base: &[f64],
 ) -> Option<Refined> {
+    let is_place = |i: usize| variant.spec.param(i).is_some_and(|param| param.neutral.is_none());
     let mut told = vec![None; evidence.measured_runs];
     for (&run, part) in runs.iter().zip(parts) {
         let errors = spread_errors(&part.settings[0], 0, part);
         let values = numbers(&part.settings[0]);
-        told[run] = (errors.iter().all(|error| error.is_finite())).then_some(OfRun { values, errors });
+        let is_told = |(i, error): (usize, &f64)| error.is_finite() || is_place(i);
+        told[run] = (errors.iter().enumerate().all(is_told)).then_some(OfRun { values, errors });
     }
+    give_places(&mut told);
     let (values, errors) = filled(&told)?;
     let of = |values| Setting {
         spec: variant.spec,
@@ -242,6 +246,28 @@ fn by_runs(
         fitted: parts.iter().map(|part| part.knobs.len()).sum(),
         by: By::Run,
     })
+}
+
+/// Gives values that a run does not tell, as the place of what does nothing there, the mean of the other runs'; they are not fitted.
+fn give_places(told: &mut [Option<OfRun>]) {
+    let numbers = told
+        .iter()
+        .flatten()
+        .map(|run| run.values.len())
+        .max()
+        .unwrap_or(0);
+    for i in 0..numbers {
+        let known: Vec<f64> = (told.iter().flatten())
+            .filter(|run| run.errors[i].is_finite())
+            .map(|run| run.values[i])
+            .collect();
+        for run in told.iter_mut().flatten().filter(|run| !run.errors[i].is_finite()) {
+            if !known.is_empty() {
+                run.values[i] = known.as_slice().mean();
+            }
+            run.errors[i] = 0.0;
+        }
+    }
 }
 
 /// Refines several settings together from where each of them was best alone.

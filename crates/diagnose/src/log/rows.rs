@@ -50,9 +50,9 @@ impl LogRow {
         }
     }
 
-    /// Whether it has readings and the command that followed them.
+    /// Whether it has readings, or some of them, and the command that followed.
     pub fn tells(&self) -> bool {
-        self.commands() && self.read().is_some()
+        self.commands() && self.readings.iter().any(|reading| reading.is_finite())
     }
 
     /// Whether the command is known.
