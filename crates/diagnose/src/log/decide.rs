@@ -79,15 +79,27 @@ fn decided(declared: &[Controller], found: &[Option<Constants>]) -> Decided {
         return none;
     }
     let changed = changed(declared, found);
-    let in_range = |candidate: &Candidate| candidate.setting.check(0).is_ok();
-    match changed.is_empty() {
-        true => Decided::AsDeclared,
-        // A gain or a speed a thousand times as large is another unit.
-        false if !changed.iter().all(in_range) => Decided::NoController {
+    // A gain or a speed a thousand times as large is another unit, and one below 0 another order of columns.
+    let in_range = |run: &usize| {
+        let of_run = |candidate: &Candidate| {
+            let spec = candidate.setting.spec;
+            let value = candidate
+                .setting
+                .values(0, *run)
+                .map(|(values, _)| Setting::constant(spec, values));
+            value.is_ok_and(|value| value.check(0).is_ok())
+        };
+        changed.iter().all(of_run)
+    };
+    let told = (0..found.len()).filter(|&run| found[run].is_some());
+    let wrong: Vec<usize> = told.filter(|run| !in_range(run)).collect();
+    match (wrong.is_empty(), changed.is_empty()) {
+        (false, _) => Decided::NoController {
             share: 1.0,
-            runs: (0..found.len()).filter(|&run| found[run].is_some()).collect(),
+            runs: wrong,
         },
-        false => Decided::Changed(changed),
+        (true, true) => Decided::AsDeclared,
+        (true, false) => Decided::Changed(changed),
     }
 }
 
