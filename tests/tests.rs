@@ -14,6 +14,7 @@ mod ground;
 mod iris;
 mod practice;
 mod separate;
+mod several_sets;
 mod support;
 mod sweep;
 mod trace_input;

@@ -5,7 +5,7 @@ use std::ops::Range;
 use std::path::PathBuf;
 
 use serde_json::Value;
-use sim::{Controller, Pattern, Setting};
+use sim::{Pattern, Setting};
 
 use crate::ground;
 use crate::support::{Scratch, world_with};
@@ -13,7 +13,7 @@ use crate::tracing::{Robot, holds, rewrite, says, share_signatures, trace, try_t
 use crate::undeclared::{LIMP, LIMPING, limping};
 
 /// A robot that limps, of which little is measured.
-fn few_laps(laps: &[usize]) -> Robot {
+pub(crate) fn few_laps(laps: &[usize]) -> Robot {
     let laps = laps.to_vec();
     Robot { laps, ..limping() }
 }
@@ -291,143 +291,6 @@ fn laps_of_another_world_are_refused() {
             "--quiet",
         ],
         "set: driven in another world (set/other.toml) than the model's",
-    );
-}
-
-#[test]
-fn sets_with_different_declarations_are_traced_together() {
-    let scratch = Scratch::new();
-    let robot = few_laps(&[4; 2]);
-    robot.record(&scratch, "set");
-    let reactive = Robot {
-        controller: Controller::Braitenberg {
-            speed_m_s: 0.05,
-            gain_per_count: 0.001,
-        },
-        declared: "controller.gain_per_count = 0.001",
-        ..robot
-    };
-    reactive.record(&scratch, "reactive");
-    let found = trace(&scratch, "braitenberg", "set", &["--measured", "reactive"]);
-    says(&found, "explained", &["wheel-asymmetry"]);
-    holds(&found["effects"][0], "ratio", LIMPING, 1.0);
-    let held_out = serde_json::json!(["set/a", "set/b", "reactive/a", "reactive/b"]);
-    assert_eq!(found["error"]["held_out"], held_out);
-
-    // What is held out of the second set is held against simulations of the second declaration.
-    let longer = Robot {
-        laps: vec![5; 2],
-        ..reactive
-    };
-    longer.record(&scratch, "unseen");
-    let held_out = ["--measured", "reactive", "--held-out", "unseen"];
-    let found = trace(&scratch, "braitenberg", "set", &held_out);
-    assert_eq!(
-        found["error"]["held_out"],
-        serde_json::json!(["unseen/a", "unseen/b"])
-    );
-    let gates = scratch.read("out/gates.csv");
-    let rows: Vec<&str> = gates.lines().skip(1).collect();
-    assert!(
-        rows.len() == 100 && rows.iter().all(|row| row.starts_with("unseen,")),
-        "{gates}"
-    );
-}
-
-#[test]
-fn logs_of_sets_with_different_declarations_are_used_together() {
-    let scratch = Scratch::new();
-    let robot = limping().logged(&[3; 2]);
-    robot.record(&scratch, "set");
-    let reactive = Robot {
-        controller: Controller::Braitenberg {
-            speed_m_s: 0.05,
-            gain_per_count: 0.001,
-        },
-        declared: "controller.gain_per_count = 0.001",
-        ..robot.clone()
-    };
-    reactive.record(&scratch, "reactive");
-    few_laps(&[4]).record(&scratch, "seen");
-    let with = |more: &[&str]| {
-        let more: Vec<&str> = more.iter().flat_map(|set| ["--measured", set]).collect();
-        let found = trace(&scratch, "braitenberg", "set", &more);
-        says(&found, "explained", &["wheel-asymmetry"]);
-        holds(&found["effects"][0], "ratio", LIMPING, 1.0);
-        let steps = found["logs"]["control_steps"].as_u64().unwrap();
-        let [low, high] =
-            ["low", "high"].map(|key| found["effects"][0]["parameters"][0][key].as_f64().unwrap());
-        (steps, high - low, found["remarks"].clone())
-    };
-    let (alone, wide, _) = with(&[]);
-    let (together, narrow, remarks) = with(&["reactive", "seen"]);
-    assert!(
-        together > 19 * alone / 10 && narrow < 0.9 * wide,
-        "{together} {alone} {narrow} {wide}"
-    );
-    assert!(!remarks.to_string().contains("not used"), "{remarks}");
-
-    // Other walls are other rays.
-    let finer = Robot {
-        declared: "controller.gain_per_count = 0.001\nwall.max_error_m = 0.0049",
-        ..reactive
-    };
-    finer.record(&scratch, "finer");
-    let (steps, _, remarks) = with(&["finer"]);
-    assert_eq!(steps, alone);
-    let said = "finer: 2 logs not used; they are declared with other walls, another body";
-    assert!(remarks.to_string().contains(said), "{remarks}");
-}
-
-#[test]
-fn sets_with_other_gates_are_refused() {
-    let scratch = Scratch::new();
-    few_laps(&[3]).record(&scratch, "set");
-    let reactive = Robot {
-        controller: Controller::Braitenberg {
-            speed_m_s: 0.05,
-            gain_per_count: 0.001,
-        },
-        declared: "controller.gain_per_count = 0.001\nrun.gates = 50",
-        ..few_laps(&[3])
-    };
-    reactive.record(&scratch, "reactive");
-    let ran = try_trace(&scratch, "braitenberg", "set", &["--measured", "reactive"]);
-    let said =
-        "reactive: declares 50 gates (run.gates), and set has 100: laps are compared at the same gates";
-    assert!(
-        ran.status == Some(2) && ran.stderr.contains(said),
-        "{}",
-        ran.stderr
-    );
-}
-
-#[test]
-fn a_size_of_a_log_is_not_that_of_the_run_that_it_is_judged_by() {
-    let scratch = Scratch::new();
-    let gains = Setting {
-        spec: sim::find("controller-gain").unwrap(),
-        pattern: Pattern::ByRun(vec![vec![0.8], vec![1.3]]),
-    };
-    Robot::with(gains).logged(&[4; 2]).record(&scratch, "set");
-    let found = trace(&scratch, "braitenberg", "set", &[]);
-    says(&found, "explained", &["controller-gain"]);
-    assert_eq!(found["effects"][0]["by"], "run");
-    // Each run has the other one's gain then.
-    let [after, floor] = ["after", "floor"].map(|key| found["error"][key].as_f64().unwrap());
-    assert!(after > 1.5 * floor, "{after} {floor}");
-
-    // Of one log among several runs it is.
-    few_laps(&[4]).record(&scratch, "seen");
-    limping().logged(&[4]).record(&scratch, "logged");
-    let first = scratch.read("seen/run_a.csv");
-    let later: Vec<&str> = first.lines().filter(|line| !line.starts_with("0.000,")).collect();
-    scratch.write("seen/run_a.csv", later.join("\n"));
-    let found = trace(&scratch, "braitenberg", "logged", &["--measured", "seen"]);
-    let said = "One log only: the error after on run logged/a is that of the very run that was fitted.";
-    assert!(
-        found["remarks"].as_array().unwrap().contains(&said.into()),
-        "{found:#}"
     );
 }
 
