@@ -1,7 +1,5 @@
 //! Names that are one answer to laps alone: the most probable answer is the one whose names together are.
 
-use sim::{Pattern, Setting, Stage};
-
 use super::atlas::Atlas;
 use super::screen::price;
 use super::search::Found;
@@ -27,16 +25,6 @@ fn classes_of(explanation: &Explanation) -> Vec<&'static str> {
     classes
 }
 
-/// The logarithm of how probable it is beforehand that sizes have their patterns: what a robot is made of differs from run to run and
-/// changes in time, the constants of its program hardly do.
-fn prior_of_patterns(settings: &[Setting]) -> f64 {
-    const PROGRAMS: f64 = 0.1;
-    let changes = |setting: &&Setting| {
-        setting.spec.stage == Stage::Decide && !matches!(setting.pattern, Pattern::Constant(_))
-    };
-    settings.iter().filter(changes).count() as f64 * PROGRAMS.ln()
-}
-
 impl Atlas {
     /// Brings the best explanation of the most probable answer to the front. Explanations of the same classes are one answer, as
     /// probable as they are together.
@@ -50,7 +38,7 @@ impl Atlas {
             let shares = found.hypothesis.shares_left(&found.errors, self);
             Way {
                 answer: classes_of(&found.explanation),
-                score: found.explanation.score + prior_of_patterns(&found.explanation.settings()),
+                score: found.explanation.score,
                 occam: shares.iter().map(|share| share.ln() + schwarz).sum(),
             }
         };
@@ -64,7 +52,7 @@ impl Atlas {
 /// One way to an answer.
 struct Way<T> {
     answer: T,
-    /// Log-likelihood less the price of the fitted numbers, and what is known of patterns beforehand.
+    /// Log-likelihood less the price of the fitted numbers.
     score: f64,
     /// What the logarithm of how probable it makes the data has beyond that.
     occam: f64,
@@ -134,24 +122,6 @@ mod tests {
             most_probable(&ways(&[("a", 9.0, narrow), ("b", 8.9, wide)])),
             Some(0)
         );
-    }
-
-    #[test]
-    fn constants_of_a_program_do_not_change_by_themselves() {
-        let of = |name: &str, pattern: Pattern| {
-            let spec = sim::find(name).expect("it is in the list");
-            prior_of_patterns(&[Setting { spec, pattern }])
-        };
-        let by_run = Pattern::ByRun(vec![vec![1.1], vec![0.9]]);
-        let by_time = Pattern::ByTime {
-            start: vec![1.1],
-            per_s: vec![1e-4],
-        };
-        assert_eq!(of("reading-gain", by_run.clone()), 0.0);
-        assert_eq!(of("controller-gain", Pattern::Constant(vec![1.1])), 0.0);
-        for pattern in [by_run, by_time] {
-            assert!((of("controller-gain", pattern).exp() - 0.1).abs() < 1e-12);
-        }
     }
 
     #[test]

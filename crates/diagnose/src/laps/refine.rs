@@ -438,19 +438,15 @@ impl Atlas {
 
     /// What a hypothesis pays for its fitted numbers, for the choice of its probes, and for what robots hardly do.
     fn price_of(&self, hypothesis: &Hypothesis) -> f64 {
-        /// A program's constants stay what they are while it runs, and an axle in every run: one in twenty that it is not another cause
-        /// that changes.
+        /// A program's constants stay what they are, and so does an axle: one in twenty that it is not another cause that changes.
         const CHANGING_CONSTANT: f64 = 3.0;
         /// What slips more in one moment does not slip less in the next: laps tell that from less slip as little as memory from more.
         const SWINGING_SLIP: f64 = 3.0;
         let of_part = |part: &Part| {
             let spec = self.probes[part.probe].spec;
             let swings = spec.name == "slip-memory" && part.mean_size(self) < 0.0;
-            let changes = match part.shape {
-                Shape::Constant => false,
-                Shape::ByRun => spec.name == "axle-length",
-                Shape::ByTime => spec.name == "axle-length" || spec.stage == Stage::Decide,
-            };
+            let changes =
+                part.shape != Shape::Constant && (spec.name == "axle-length" || spec.stage == Stage::Decide);
             self.choice(part.probe)
                 + if changes { CHANGING_CONSTANT } else { 0.0 }
                 + if swings { SWINGING_SLIP } else { 0.0 }
