@@ -184,7 +184,7 @@ fn a_size_by_run_is_known_where_there_are_logs_and_judged_by_their_laps() {
     more.record(&scratch, "seen");
     let found = trace(&scratch, "braitenberg", "set", &["--measured", "seen"]);
     near(&found, &[20.0, 0.0, 10.0, 10.0]);
-    let said = "seen has no logs: its laps judge what the other data sets' logs say.";
+    let said = "seen has no logs: its laps judge what the other data sets' logs say, unless sizes go by run.";
     assert_eq!(found["remarks"], serde_json::json!([said]));
 }
 

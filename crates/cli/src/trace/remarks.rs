@@ -91,7 +91,7 @@ pub(super) fn remarks(recordings: &[Recording], logged: Option<&Logs>) -> Vec<St
         }
         if let ([_, ..], 0) = (used, count) {
             remarks.push(format!(
-                "{} has no logs: its laps judge what the other data sets' logs say.",
+                "{} has no logs: its laps judge what the other data sets' logs say, unless sizes go by run.",
                 set.name
             ));
         }
