@@ -240,3 +240,34 @@ fn data_sets_of_one_name_are_told_apart() {
     let held_out = serde_json::json!(["set/a", "set/b", "set (2)/a", "set (2)/b"]);
     assert_eq!(found["error"]["held_out"], held_out);
 }
+
+#[test]
+fn a_model_whose_effect_goes_by_run_has_a_size_for_each_run_of_all_sets() {
+    let scratch = Scratch::new();
+    let lit = by_run("directional-light", &[&[30.0, 1.0], &[0.0, 1.0]]);
+    Robot::with(lit).logged(&[4; 2]).record(&scratch, "set");
+    let model = "world = \"roduit2007\"\n[[effect]]\nkind = \"directional-light\"\nby = \"run\"\ncounts = [30, 0]\n\
+                 azimuth_rad = [1, 1]\n";
+    scratch.write("lit.toml", model);
+    let args = [
+        "trace",
+        "lit.toml",
+        "--measured",
+        "set",
+        "--no-cache",
+        "--quiet",
+        "--out",
+    ];
+    scratch.done([args.as_slice(), &["out"]].concat());
+    let found: Value = serde_json::from_str(&scratch.read("out/trace.json")).unwrap();
+    says(&found, "faithful", &[]);
+    let [before, floor] = ["before", "floor"].map(|key| found["error"][key].as_f64().unwrap());
+    assert!((0.6..1.6).contains(&(before / floor)), "{before} {floor}");
+
+    let other = by_run("directional-light", &[&[10.0, 1.0], &[5.0, 1.0]]);
+    Robot::with(other).logged(&[5; 2]).record(&scratch, "more");
+    scratch.refuses(
+        &[args.as_slice(), &["out2", "--measured", "more"]].concat(),
+        "lit.toml:4: effect.0.by: directional-light has values by run for 2 of them, and there are more",
+    );
+}

@@ -110,7 +110,12 @@ impl Judged<'_> {
             } else {
                 alone(without)?
             };
-            let of_chance = if recording.has_holes() { &own_after } else { after };
+            // Where each run is expected for itself, chance is what is left about that.
+            let of_chance = if recording.expects_the_same_of_runs() {
+                after
+            } else {
+                &own_after
+            };
             distances_m.push(distances(run, &own_before, &own_after, of_chance));
         }
         Ok(self.errors(all, runs.clone(), &distances_m))
