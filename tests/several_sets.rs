@@ -232,8 +232,8 @@ fn sensors_that_leap_at_their_range_and_have_no_noise_there_are_traced_by_logs()
 #[test]
 fn data_sets_of_one_name_are_told_apart() {
     let scratch = Scratch::new();
-    few_laps(&[3; 2]).record(&scratch, "set");
-    few_laps(&[4; 2]).record(&scratch, "other/set");
+    limping().logged(&[3; 2]).record(&scratch, "set");
+    limping().logged(&[4; 2]).record(&scratch, "other/set");
     let description = scratch.read("other/set/dataset.toml").replace("other/set", "set");
     scratch.write("other/set/dataset.toml", description);
     let found = trace(&scratch, "braitenberg", "set", &["--measured", "other/set"]);
