@@ -306,7 +306,7 @@ fn residual(trace: &Trace) -> Vec<Block> {
             "residual_map",
             "Fig. A",
             format!(
-                "Where the residual sits: the mean measured lap{of}, coloured by its distance from the declared model's."
+                "Where the residual sits: the mean measured lap, coloured by its distance from the declared model's.{of}"
             ),
             pictures::residual_map(trace),
         ),
@@ -369,12 +369,12 @@ fn sizes(explanation: &Explanation) -> String {
     }
 }
 
-/// Whose laps are drawn, for a caption, where there are several data sets.
+/// Whose laps are drawn, a sentence for a caption, where there are several data sets.
 fn of_shown(trace: &Trace) -> String {
     match trace.recordings.len() {
         1 => String::new(),
         _ => format!(
-            " of {} (all data sets: gates.csv)",
+            " These are the laps of {}; gates.csv has all data sets.",
             trace.shown().0.measured.set.name
         ),
     }
@@ -387,15 +387,15 @@ fn before_and_after(trace: &Trace) -> Vec<Block> {
             "mean_laps",
             "Fig. B",
             format!(
-                "Mean position at each gate: measured, simulated with the declared model, and with the answer{of}. Below, what each of \
-                 the two leaves of the measured mean lap; in the band, 95 of 100 gates lie by chance."
+                "Mean position at each gate: measured, simulated with the declared model, and with the answer. Below, what each of \
+                 the two leaves of the measured mean lap; in the band, 95 of 100 gates lie by chance.{of}"
             ),
             pictures::mean_laps(trace),
         ),
         Picture::block(
             "laps",
             "Fig. C",
-            format!("Laps of the declared model and with the answer, over measured ones{of}."),
+            format!("Laps of the declared model and with the answer, over measured ones.{of}"),
             pictures::laps(trace),
         ),
     ]
