@@ -23,6 +23,17 @@ pub(crate) struct Ran {
     pub(crate) stderr: String,
 }
 
+impl Ran {
+    /// The program refused, and said this.
+    pub(crate) fn is_refused_with(&self, said: &str) {
+        assert!(
+            self.status == Some(2) && self.stderr.contains(said),
+            "{}",
+            self.stderr
+        );
+    }
+}
+
 impl From<Output> for Ran {
     fn from(output: Output) -> Self {
         Self {

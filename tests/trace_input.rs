@@ -223,11 +223,7 @@ fn rows_between_control_steps_are_refused() {
     });
     let ran = try_trace(&scratch, "braitenberg", "set", &[]);
     let said = "set/run_a.csv: a row every 0.032 s, and the declared robot's control step is 0.064 s";
-    assert!(
-        ran.status == Some(2) && ran.stderr.contains(said),
-        "{}",
-        ran.stderr
-    );
+    ran.is_refused_with(said);
 }
 
 #[test]
@@ -248,11 +244,7 @@ fn a_run_that_is_given_twice_is_refused() {
     });
     let ran = try_trace(&scratch, "braitenberg", "set", &["--held-out", "again"]);
     let said = "again/run_a.csv: the same run as set/run_a.csv; give each run once";
-    assert!(
-        ran.status == Some(2) && ran.stderr.contains(said),
-        "{}",
-        ran.stderr
-    );
+    ran.is_refused_with(said);
 }
 
 #[test]

@@ -131,13 +131,6 @@ fn explain_ripple(search: &Search<'_>, screened: &[Screened], ripple: &Ripple) -
     }) {
         return with_first(true, wheel, singles);
     }
-    // What explains most, and more than any name, lacks a second effect rather than another first one.
-    if first_is(&wheel, |wheel| wheel.share > MOST && wheel.score > rival) {
-        let found = preferred(wheel.clone(), search.further(wheel.iter()));
-        if first_is(&found, leaves_nothing_to_ask) {
-            return with_first(true, found, singles);
-        }
-    }
     let found = explain(search, singles);
     let Some(best) = found.first() else {
         return wheel;

@@ -57,7 +57,7 @@ impl Trial<'_> {
             };
             local.columns = local.columns.into_iter().map(Column::without_noise).collect();
             let Nearest { moves, errors, .. } =
-                self.nearest(&local.center, &local.scatter, &local.columns, &freedoms, &[]);
+                self.nearest(&local.center, &local.scatter, &local.columns, &freedoms);
             let found = self
                 .atlas
                 .quantised(self.atlas.with_moves(&look.found, &freedoms, &moves));
@@ -145,7 +145,7 @@ impl Trial<'_> {
             silent: &silent,
             ..*self
         };
-        let nearest = without.nearest(&local.center, &local.scatter, &columns, &look.freedoms, &silent);
+        let nearest = without.nearest(&local.center, &local.scatter, &columns, &look.freedoms);
         let found = self.atlas.with_moves(&look.about, &look.freedoms, &nearest.moves);
         let hunted = without.hunt_about(&found).unwrap_or(found);
         Ok(self.atlas.quantised(hunted))

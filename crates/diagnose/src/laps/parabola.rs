@@ -267,17 +267,16 @@ pub(super) struct Nearest {
 
 impl Trial<'_> {
     /// Where parabolas through a simulated hypothesis are nearest to the data, in units of a scatter that widens with its numbers: where
-    /// the likelihood is highest. Entries in `silent` have no say.
+    /// the likelihood is highest.
     pub(super) fn nearest(
         &self,
         center: &Evaluated,
         scatter: &[Scatter],
         columns: &[Column],
         freedoms: &[Freedom],
-        silent: &[Range<usize>],
     ) -> Nearest {
         let target = white(scatter, &self.atlas.layout, self.data, &center.expectation);
-        let laps = self.atlas.laps_of(center.doubt, silent);
+        let laps = self.atlas.laps_of(center.doubt, self.silent);
         let (moves, covariance) = nearest(columns, &target, freedoms, &laps);
         let moves = DVector::from_fn(moves.len(), |i, _| freedoms[i].possible(moves[i]));
         let left = left_of(columns, &target, &moves);

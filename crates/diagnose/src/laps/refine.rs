@@ -218,7 +218,7 @@ impl Trial<'_> {
             return Some(self.atlas.climbed(descent, &likeliest, round));
         }
         local.sides.clear();
-        let nearest = self.nearest(&local.center, &local.scatter, &local.columns, freedoms, &[]);
+        let nearest = self.nearest(&local.center, &local.scatter, &local.columns, freedoms);
         let Descent {
             hypothesis,
             mut freedoms,
@@ -283,7 +283,7 @@ impl Trial<'_> {
         let columns: Vec<Column> = (local.columns.iter().zip(moved.iter()))
             .map(|(column, moved)| column.from(*moved))
             .collect();
-        let nearest = self.nearest(&center, &local.scatter, &columns, &freedoms, &[]);
+        let nearest = self.nearest(&center, &local.scatter, &columns, &freedoms);
         let (gain, score_error) = self.likely_gain(&descent.hypothesis, &center, nearest.hoped)?;
         let Nearest { moves, errors, .. } = nearest;
         let found = full && is_settled(&moves, &nearest.covariance, &freedoms);

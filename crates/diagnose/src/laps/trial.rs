@@ -11,6 +11,6 @@ pub(super) struct Trial<'a> {
     pub(super) atlas: &'a Atlas,
     pub(super) simulate: &'a Simulate<'a>,
     pub(super) data: &'a Expectation,
-    /// Entries that have no say in the size of what jumps.
+    /// Entries that have no say in sizes.
     pub(super) silent: &'a [Range<usize>],
 }
