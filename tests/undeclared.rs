@@ -80,6 +80,31 @@ impl Effect for Puddle {
     }
 }
 
+/// A rug, with straight edges.
+static RUG: Spec = Spec {
+    name: "rug",
+    stage: Stage::Act,
+    summary: "wheels are slower on a rectangle of the floor",
+    params: &[Param::new("share", "", 0.0, 0.0, 0.9)],
+    list: None,
+    build: || Box::new(Rug),
+};
+
+/// The middle of the rug, on the track, and half of its sides, m.
+const RUG_M: ([f64; 2], [f64; 2]) = ([1.0, 0.9], [0.15, 0.12]);
+
+#[derive(Debug)]
+struct Rug;
+
+impl Effect for Rug {
+    fn ground(&mut self, values: &[f64], now: &Moment, wheels: WheelSpeeds) -> WheelSpeeds {
+        let (middle, sides) = (Vec2::new(RUG_M.0[0], RUG_M.0[1]), RUG_M.1);
+        let off = now.pose.position - middle;
+        let is_on_it = off.x.abs() < sides[0] && off.y.abs() < sides[1];
+        wheels.map(|speed| speed * if is_on_it { 1.0 - values[0] } else { 1.0 })
+    }
+}
+
 /// Sensors that warm up: their readings grow for some minutes after the start.
 static WARMING: Spec = Spec {
     name: "warming",
@@ -456,6 +481,30 @@ fn a_tilted_camera_is_known_by_its_scale_over_the_floor() {
         coefficient(0) == 0.0 && coefficient(2).abs() < 0.1 * PER_M,
         "{found:#}"
     );
+}
+
+#[test]
+fn a_rug_is_an_area_of_the_floor_on_which_wheels_are_slower() {
+    const SHARE: f64 = 0.15;
+    share_signatures("braitenberg");
+    let scratch = Scratch::new();
+    Robot::with(Setting::constant(&RUG, [SHARE])).record(&scratch, "set");
+    let found = trace(&scratch, "braitenberg", "set", &[]);
+    assert_ne!(found["verdict"], "unexplained", "{found:#}");
+    let effect = &found["effects"][0];
+    for (key, word) in [
+        ("name", "unlisted"),
+        ("stage", "act"),
+        ("acts_on", "wheel speed"),
+        ("depends_on", "place"),
+        ("basis", "area"),
+    ] {
+        assert_eq!(effect[key], word, "{found:#}");
+    }
+    let coefficient = |i: usize| effect["coefficients"][i].as_f64().unwrap();
+    assert!((coefficient(0) + SHARE).abs() < 0.1 * SHARE, "{found:#}");
+    // Seen from the middle of the arena; how wide the rug is across the track no lap tells.
+    assert!((0.7 + coefficient(1) - RUG_M.0[0]).abs() < 0.05, "{found:#}");
 }
 
 #[test]

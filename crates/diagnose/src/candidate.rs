@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-use sim::{Param, Pattern, Setting, Stage, UNLISTED};
+use sim::{Param, Pattern, Setting, Spec, Stage, UNLISTED};
 
 use crate::Cause;
 
@@ -107,6 +107,12 @@ pub(crate) fn label(setting: &Setting) -> String {
 /// Values of [`UNLISTED`] before its coefficients: what it acts on, what it depends on, and the basis.
 pub(crate) const WORDS: usize = 3;
 
+/// The basis of what acts on a part of the floor.
+pub(crate) const AREA: &str = "area";
+
+/// Coefficients of an area behind how much it does: where it is (x, y), its radius, its softness.
+pub(crate) const AREA_ORIGIN: [f64; 4] = [0.0, 0.0, 0.15, 1.0];
+
 /// The values of an effect without a name that does nothing yet, with so many coefficients; `None` if it knows no such word.
 pub(crate) fn unlisted_values(words: [&str; WORDS], coefficients: usize) -> Option<Vec<f64>> {
     let number = |(param, word): (&Param, &str)| {
@@ -135,6 +141,19 @@ pub(crate) fn within(value: f64, param: &Param) -> f64 {
     match round(param) {
         Some(turn) => (value - turn.start).rem_euclid(turn.end - turn.start) + turn.start,
         None => value.clamp(param.low, param.high),
+    }
+}
+
+/// A value of an effect brought into its range, as [`within`] does; the radius and the softness of an area, for which any number
+/// stands, to where they make a difference.
+pub(crate) fn bounded(spec: &Spec, values: &[f64], place: usize, value: f64) -> f64 {
+    const RADIUS_M: [f64; 2] = [0.01, 1.0];
+    const SOFTNESS: [f64; 2] = [0.05, 2.0];
+    let is_area = *spec == UNLISTED && UNLISTED.params[2].choices[values[2] as usize] == AREA;
+    match place.checked_sub(WORDS) {
+        Some(3) if is_area => value.clamp(RADIUS_M[0], RADIUS_M[1]),
+        Some(4) if is_area => value.clamp(SOFTNESS[0], SOFTNESS[1]),
+        _ => spec.param(place).map_or(value, |param| within(value, param)),
     }
 }
 

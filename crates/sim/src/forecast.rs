@@ -90,7 +90,7 @@ impl<'w> Forecast<'w> {
                 command: WheelSpeeds::default(),
                 gate: 0,
                 gate_count: world.circuit().gates.len(),
-                arena_middle: world.arena_middle(),
+                arena_middle: world.circuit().middle(),
             },
         };
         forecast.compare(world)?;

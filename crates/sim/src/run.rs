@@ -128,7 +128,7 @@ impl<'w> Run<'w> {
             command: self.command,
             gate: self.next_gate,
             gate_count: self.apparatus.world.circuit().gates.len(),
-            arena_middle: self.apparatus.world.arena_middle(),
+            arena_middle: self.apparatus.world.circuit().middle(),
         };
         let observed = self.observe(&now);
         let readings = self.sense(&now);

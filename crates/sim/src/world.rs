@@ -26,6 +26,12 @@ impl Circuit {
         let gates = course.gates(count)?;
         Ok(Self { course, gates })
     }
+
+    /// The middle of the arena, m.
+    pub fn middle(&self) -> Vec2 {
+        let [width_m, height_m] = self.course.arena_m;
+        Vec2::new(0.5 * width_m, 0.5 * height_m)
+    }
 }
 
 /// Walls cut into pieces, and what is prepared for casting rays at them and for touching them.
@@ -345,12 +351,6 @@ impl World<'_> {
     /// Time of a lap along the midline at the controller's speed, s.
     pub fn nominal_lap_s(&self) -> f64 {
         self.circuit().gates.midline_length_m() / self.machine.controller.speed_m_s()
-    }
-
-    /// The middle of the arena, m.
-    pub(crate) fn arena_middle(&self) -> Vec2 {
-        let [width_m, height_m] = self.circuit().course.arena_m;
-        Vec2::new(0.5 * width_m, 0.5 * height_m)
     }
 
     /// Unit vector in which this run crosses a gate.

@@ -5,7 +5,7 @@ use diagnose::{
     Answer, Atlas, Baselines, Detectable, Explanation, FourNumbers, LogDiagnosis, LoggedRun, ObservedLap,
     Verdict, Watch, diagnose_logs,
 };
-use sim::{Pattern, Setting};
+use sim::{Pattern, Setting, Vec2};
 
 use super::atlas::{Purpose, atlas};
 use super::cache::Cache;
@@ -72,10 +72,21 @@ impl<'a> TracedLaps<'a> {
         Ok(self.atlas.confirm(&simulate, &self.laps, effects)?)
     }
 
+    /// Places along the track, from the arena's middle, m.
+    fn places(&self) -> Vec<Vec2> {
+        const APART_M: f64 = 0.28;
+        let circuit = self.recordings[0].setup.scene.circuit();
+        let gates = (APART_M / circuit.gates.spacing_m()).round().max(1.0) as usize;
+        let centers = circuit.gates.iter().step_by(gates).map(|gate| gate.center);
+        centers.map(|center| center - circuit.middle()).collect()
+    }
+
     /// What the laps say; `watch` is told what is being tried.
     pub(super) fn named(&self, watch: &Watch<'_>) -> Result<Named> {
         let simulate = |effects: &[Setting], set: u64| self.simulate(effects, set);
-        let found = self.atlas.diagnose(&simulate, &self.laps, watch)?;
+        let found = self
+            .atlas
+            .diagnose(&simulate, &self.laps, &self.places(), watch)?;
         Ok(Named {
             residual: found.residual,
             answer: found.answer,

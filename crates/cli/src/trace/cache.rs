@@ -77,3 +77,28 @@ fn directories() -> Option<PathBuf> {
     }
     variable("XDG_CACHE_HOME").or_else(|| variable("HOME").map(|home| home.join(".cache")))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_that_is_no_whole_atlas_is_not_read() {
+        let folder = tempfile::tempdir().unwrap();
+        let cache = Cache(Some(folder.path().to_path_buf()));
+        let file = cache.file("key").unwrap();
+        let no_atlas = b"seventeen laps to the left";
+        let its_hash = sha256(no_atlas);
+        let with_hash = |hash: &str| [hash.as_bytes(), no_atlas].concat();
+        for content in [
+            Vec::new(),
+            its_hash.as_bytes()[..63].to_vec(),
+            with_hash(&sha256(b"another")),
+            with_hash(&its_hash),
+        ] {
+            fs::write(&file, &content).unwrap();
+            assert!(cache.get("key", 0.032).is_none(), "{content:?}");
+        }
+        assert!(cache.get("no such key", 0.032).is_none());
+    }
+}

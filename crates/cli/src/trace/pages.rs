@@ -7,7 +7,7 @@ use sim::Pattern;
 use super::answer::rivals;
 use super::document::distinct;
 use super::limits::{decide_in_words, limits, next_experiment, next_in_words, stages};
-use super::unnamed::unnamed;
+use super::unnamed::{in_words, unnamed};
 use super::{Trace, pictures};
 use crate::experiments::{Block, Picture, Section};
 use crate::figures::MM;
@@ -69,7 +69,11 @@ pub(crate) fn summary(trace: &Trace) -> String {
         }
         (Verdict::Unexplained, _) | (_, None) => unexplained(trace),
         (v, Some(answer)) => {
-            let what: Vec<String> = answer.effects.iter().map(describe).collect();
+            let what: Vec<String> = answer
+                .effects
+                .iter()
+                .map(|effect| describe(trace, effect))
+                .collect();
             let rest = if v == Verdict::Explained && answer.remainder_p.is_some() && !answer.fits() {
                 " What remains is significant but small."
             } else if v == Verdict::PartlyExplained {
@@ -161,13 +165,10 @@ pub(crate) fn gates_csv(trace: &Trace) -> String {
 }
 
 /// An effect with its size, for a sentence.
-fn describe(effect: &Candidate) -> String {
+fn describe(trace: &Trace, effect: &Candidate) -> String {
     let name = effect.setting.spec.name;
     match (&effect.setting.pattern, Cause::of(&effect.setting)) {
-        (_, Some(cause)) => format!(
-            "an effect without a name on the {} that depends on the {}",
-            cause.acts_on, cause.depends_on
-        ),
+        (_, Some(cause)) => in_words(trace, effect, &cause),
         (Pattern::Constant(_), _) => format!("{name} ({})", size(effect)),
         (Pattern::ByTime { .. }, _) => format!("{name} changing in time ({})", size(effect)),
         (Pattern::ByRun(_), _) => format!("{name} by run ({})", size(effect)),
@@ -345,7 +346,7 @@ fn candidates(trace: &Trace) -> Vec<Block> {
             e.explained(trace.laps_alone())
                 .map_or("-".into(), |share| format!("{:.1} %", 100.0 * share)),
             e.remainder_p.map_or("-".into(), probability),
-            sizes(e),
+            sizes(trace, e),
         ]);
     }
     let mut blocks = vec![Block::Table(table)];
@@ -362,10 +363,14 @@ fn units(gain: f64) -> String {
     }
 }
 
-fn sizes(explanation: &Explanation) -> String {
+fn sizes(trace: &Trace, explanation: &Explanation) -> String {
     match explanation.effects.as_slice() {
         [effect] if Cause::of(&effect.setting).is_none() => size(effect),
-        effects => effects.iter().map(describe).collect::<Vec<_>>().join(" + "),
+        effects => (effects
+            .iter()
+            .map(|effect| describe(trace, effect))
+            .collect::<Vec<_>>())
+        .join(" + "),
     }
 }
 

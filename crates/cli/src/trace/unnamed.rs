@@ -1,14 +1,15 @@
-//! A cause without a name, drawn.
+//! A cause without a name, in words and drawn.
 
 use std::f64::consts::TAU;
 
 use chart::{Axis, Color, Dash, Figure, Mark, Panel, Shape};
-use diagnose::Cause;
+use diagnose::{Candidate, Cause};
 use sim::{Pattern, Vec2, unlisted_at, unlisted_on_floor};
 
 use super::Trace;
 use crate::experiments::{Block, Picture};
 use crate::figures::{colored_path, crossings, line, single};
+use crate::table::with_error;
 
 /// What a claimed cause without a name does over what it depends on: a map of the floor, or a curve.
 pub(super) fn unnamed(trace: &Trace) -> Option<Block> {
@@ -22,14 +23,7 @@ pub(super) fn unnamed(trace: &Trace) -> Option<Block> {
     let Pattern::Constant(values) = &effect.setting.pattern else {
         return None;
     };
-    let unit = match cause.acts_on.as_str() {
-        "yaw rate" => "rad/s",
-        "side slip" => "m/s",
-        "left-right difference" => "counts",
-        "camera x" | "camera y" => "m",
-        _ => "share",
-    };
-    let label = format!("{}, {unit}", cause.acts_on);
+    let label = format!("{}, {}", cause.acts_on, unit(&cause));
     let figure = if cause.depends_on == "place" {
         on_floor(trace, values, label)
     } else {
@@ -42,11 +36,42 @@ pub(super) fn unnamed(trace: &Trace) -> Option<Block> {
     Some(Picture::block("unlisted", "Fig. D", caption, figure))
 }
 
+/// A cause without a name with what is known of it, for a sentence.
+pub(super) fn in_words(trace: &Trace, effect: &Candidate, cause: &Cause) -> String {
+    let acts_on = &cause.acts_on;
+    let (spec, numbers) = (effect.setting.spec, effect.setting.pattern.numbers());
+    let words = spec.params.len();
+    let is_area = spec.params[words - 1].choices[numbers[words - 1] as usize] == "area";
+    if !is_area || numbers.len() < words + 4 {
+        return format!(
+            "an effect without a name on the {acts_on} that depends on the {}",
+            cause.depends_on
+        );
+    }
+    let middle = trace.shown().0.setup.scene.circuit().middle();
+    let [amount, x, y, radius] = [(0, 0.0), (1, middle.x), (2, middle.y), (3, 0.0)]
+        .map(|(i, from)| with_error(from + numbers[words + i], effect.standard_errors[words + i]));
+    format!(
+        "an effect without a name on the {acts_on} in an area of the floor ({amount} {}, at x = {x} m, y = {y} m, radius {radius} m)",
+        unit(cause)
+    )
+}
+
+/// The unit of what a cause does to what it acts on.
+fn unit(cause: &Cause) -> &'static str {
+    match cause.acts_on.as_str() {
+        "yaw rate" => "rad/s",
+        "side slip" => "m/s",
+        "left-right difference" => "counts",
+        "camera x" | "camera y" => "m",
+        _ => "share",
+    }
+}
+
 fn on_floor(trace: &Trace, coefficients: &[f64], label: String) -> Figure {
     let (recording, errors) = trace.shown();
     let circuit = recording.setup.scene.circuit();
-    let [width_m, height_m] = circuit.course.arena_m;
-    let middle = Vec2::new(0.5 * width_m, 0.5 * height_m);
+    let middle = circuit.middle();
     let mut points = crossings(circuit, errors.before.mean_m());
     points.push(points[0]);
     let values: Vec<f64> = (points.iter())

@@ -2,7 +2,7 @@
 
 use std::sync::OnceLock;
 
-use sim::Setting;
+use sim::{Setting, Vec2};
 
 use super::atlas::{Atlas, Simulate};
 use super::hypothesis::Hypothesis;
@@ -14,17 +14,15 @@ use super::search::{Found, Search, candidates, of_other_effects, sort};
 use super::tests_of_fit::{ALARM_P, FourNumbers};
 use super::trial::Trial;
 use super::verdict::{
-    ALL_BUT_FAULTS, ENOUGH, MOST, faults_beside, goes_over_runs_or_time, is_claimed, is_doubtful,
-    leaves_nothing_to_ask, preferred, stands_alone, suffices, unless_as_good, unless_named, verdict_of,
-    with_first,
+    ALL_BUT_FAULTS, ENOUGH, MOST, goes_over_runs_or_time, is_claimed, is_doubtful, leaves_nothing_to_ask,
+    preferred, stands_alone, suffices, unless_as_good, unless_named, verdict_of, with_first,
 };
 use crate::answer::{ALTERNATIVE, indistinguishable};
 use crate::{Answer, Cause, Error, Explanation, Verdict, Watch};
 
 /// Score of the best probe from which a data set counts as departing from the declared model, whatever the omnibus says.
 pub(super) const ALARM_SCORE: f64 = 7.0;
-/// Single effects of which the sizes are let go over the runs or in time, and several together.
-const PATTERNS_OF: usize = 3;
+/// Explanations by several effects of which the sizes are let go over the runs or in time.
 const PATTERNS_OF_SEVERAL: usize = 2;
 
 /// What laps tell about a model.
@@ -37,7 +35,8 @@ pub struct LapDiagnosis {
 }
 
 impl Atlas {
-    /// What the laps of several runs tell about the declared model; `watch` is told what is being tried.
+    /// What the laps of several runs tell about the declared model; `places` along the track, in m from the arena's middle, are where
+    /// parts of the floor are looked for that differ from the rest, and `watch` is told what is being tried.
     ///
     /// # Errors
     /// Runs of fewer than three laps, or of another shape than the atlas was made for.
@@ -45,6 +44,7 @@ impl Atlas {
         &self,
         simulate: &Simulate<'_>,
         runs: &[Vec<ObservedLap>],
+        places: &[Vec2],
         watch: &Watch<'_>,
     ) -> Result<LapDiagnosis, Error> {
         let memo = Memo::new(simulate);
@@ -63,6 +63,7 @@ impl Atlas {
             trial,
             residual: &residual,
             runs,
+            places,
             watch,
             scanned: OnceLock::new(),
             together: OnceLock::new(),
@@ -157,6 +158,7 @@ fn explain(search: &Search<'_>, mut found: Vec<Found>) -> Vec<Found> {
             return with_first(true, tilted, found);
         }
     }
+    let mut unnamed = Vec::new();
     // Of an effect that jumps a descent finds the nearest good size, not the best.
     let jumps = found.first().is_some_and(|best| search.jumped(best));
     let needs_no_scan = |best: &Explanation| {
@@ -172,15 +174,29 @@ fn explain(search: &Search<'_>, mut found: Vec<Found>) -> Vec<Found> {
                 return held_still(search, simplified(search, found));
             }
         }
-        search.scan(&mut found);
+        if jumps {
+            search.scan(&mut found);
+        }
+        // A part of the floor shows soon; for what else goes with the place sizes that jump must be known, which may be it.
+        for look in [Search::areas, Search::over_the_floor] {
+            if search.is_strong() && !first_is(&found, needs_no_scan) {
+                let tried = look(search);
+                if first_is(&tried, leaves_nothing_to_ask) {
+                    return with_first(true, tried, found);
+                }
+                unnamed.extend(tried);
+            }
+            if !search.was_scanned() {
+                search.scan(&mut found);
+            }
+        }
     }
-    found.extend(search.patterns(found.iter().take(PATTERNS_OF)));
+    found.extend(search.patterns(worth_a_pattern(&found)));
     sort(&mut found);
     let leaves_next_to_nothing = |best: &Explanation| best.share >= ENOUGH && !goes_over_runs_or_time(best);
     let pairs = match found.first() {
         Some(best) if stands_alone(&best.explanation) || leaves_next_to_nothing(&best.explanation) => {
-            let (stands, faults) = (stands_alone(&best.explanation), faults_beside(&best.explanation));
-            search.pairs_with(best, stands, faults)
+            search.pairs_with_first(&mut found)
         }
         _ => search.pairs(&mut found),
     };
@@ -208,7 +224,11 @@ fn explain(search: &Search<'_>, mut found: Vec<Found>) -> Vec<Found> {
     let nearly_all =
         |best: &Explanation| best.share >= ALL_BUT_FAULTS || best.effects.len() > 1 && best.share >= ENOUGH;
     if !first_is(&found, |best| suffices(best) || nearly_all(best)) {
-        let unnamed = search.unnamed(&found);
+        unnamed.extend(search.unnamed(&found));
+        if !search.is_strong() {
+            unnamed.extend(search.areas());
+        }
+        sort(&mut unnamed);
         found = unless_named(found, unnamed);
     }
     held_still(search, with_others_alike(search, simplified(search, found)))
@@ -265,6 +285,20 @@ fn held_still(search: &Search<'_>, found: Vec<Found>) -> Vec<Found> {
         return unless_as_good(found, settling);
     }
     found
+}
+
+/// Explanations of which the sizes are let go over the runs or in time: where the first leaves nothing to ask, those that may come near
+/// it.
+fn worth_a_pattern(found: &[Found]) -> impl Iterator<Item = &Found> {
+    const MOST: usize = 3;
+    const NEAR: f64 = 0.5;
+    let score = |found: &Found| found.explanation.score;
+    let least = if first_is(found, leaves_nothing_to_ask) {
+        NEAR * score(&found[0])
+    } else {
+        f64::NEG_INFINITY
+    };
+    found.iter().take(MOST).filter(move |found| score(found) > least)
 }
 
 fn first_is(found: &[Found], holds: impl Fn(&Explanation) -> bool) -> bool {

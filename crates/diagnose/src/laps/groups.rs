@@ -1,7 +1,8 @@
 //! Causes without a name: groups of basis functions of what a cause may depend on.
 
 use nalgebra::{DMatrix, DVector};
-use sim::UNLISTED;
+use rayon::prelude::*;
+use sim::{UNLISTED, Vec2};
 
 use super::atlas::White;
 use super::hypothesis::Hypothesis;
@@ -10,7 +11,7 @@ use super::probe::Probe;
 use super::screen::price;
 use super::steadiness::Settling;
 use super::trial::Trial;
-use crate::candidate::{WORDS, unlisted_values};
+use crate::candidate::{AREA, AREA_ORIGIN, WORDS, unlisted_values};
 
 /// Data sets simulated for each coefficient.
 const GROUP_SETS: u64 = 2;
@@ -29,6 +30,7 @@ pub(super) fn groups() -> Vec<Probe> {
         }
         probes.extend(group(target, ["time", SETTLING], &[1.0, 1.0], 0));
     }
+    probes.extend(AREA_TARGETS.into_iter().filter_map(area));
     probes.extend(group(("camera scale", 0.004), TILT, &[1.0, 2.0, 2.0], 1));
     for wheel in ["wheel speed", "left wheel", "right wheel"] {
         probes.extend(group((wheel, 0.02), [WHEEL_ANGLE, "harmonics"], &[1.0], 0));
@@ -47,6 +49,19 @@ fn group(
     let free = (first..scales.len())
         .map(|i| (WORDS + i, step * scales[i]))
         .collect();
+    Some(Probe::group(&UNLISTED, origin, free))
+}
+
+/// A target on a part of the floor: how much, where, how far and how softly are fitted.
+fn area((target, step): (&str, f64)) -> Option<Probe> {
+    const STEP_M: f64 = 0.03;
+    const STEP_OF_SOFTNESS: f64 = 0.15;
+    let mut origin = unlisted_values([target, "place", AREA], 1)?;
+    origin.extend(AREA_ORIGIN);
+    let free = [step, STEP_M, STEP_M, STEP_M, STEP_OF_SOFTNESS]
+        .into_iter()
+        .enumerate();
+    let free = free.map(|(i, step)| (WORDS + i, step)).collect();
     Some(Probe::group(&UNLISTED, origin, free))
 }
 
@@ -70,6 +85,15 @@ const TARGETS: [(&str, f64); 7] = [
     ("camera y", 8e-4),
 ];
 
+/// What a part of the floor may act on, with such steps.
+const AREA_TARGETS: [(&str, f64); 5] = [
+    ("yaw rate", 0.02),
+    ("wheel speed", 0.02),
+    ("left wheel", 0.02),
+    ("right wheel", 0.02),
+    ("reading", 0.04),
+];
+
 /// What it may depend on, the basis, and the sizes of its terms relative to the step: arena coordinates reach .6 m,
 /// differences of commands .1 m/s, runs about 1500 s.
 const DEPENDENCES: [(&str, &str, &[f64]); 5] = [
@@ -87,7 +111,19 @@ const DEPENDENCES: [(&str, &str, &[f64]); 5] = [
 impl Probe {
     /// Whether it is no group that is screened with the others.
     fn is_tried_apart(&self) -> bool {
-        self.settles() || self.turns() || self.tilts()
+        self.settles() || self.turns() || self.tilts() || self.is_an_area()
+    }
+
+    /// Whether it goes with the heading or the place, on the floor or along the lap.
+    fn goes_with_the_pose(&self) -> bool {
+        ["heading", "gate", "place"]
+            .iter()
+            .any(|word| self.is_group_with(1, word))
+    }
+
+    /// Whether it acts on a part of the floor.
+    pub(super) fn is_an_area(&self) -> bool {
+        self.is_group_with(2, AREA)
     }
 
     /// Whether it is a group of what settles while a run goes on.
@@ -114,44 +150,71 @@ impl Trial<'_> {
     /// The groups that explain a residual best at the sizes that linear algebra gives them: the best and those that are as
     /// good with fewer coefficients.
     pub(super) fn screen_groups(&self, residual: &White) -> Vec<Hypothesis> {
-        const MOST: usize = 3;
-        let all: Vec<usize> = (0..self.atlas.probes.len())
-            .filter(|&probe| *self.atlas.probes[probe].spec == UNLISTED)
-            .filter(|&probe| !self.atlas.probes[probe].is_tried_apart())
-            .collect();
-        let mut found = self.fitted_groups(residual, &all);
+        const SHARE: f64 = 0.3;
+        let all = self.groups(|probe| !probe.is_tried_apart());
+        let found = best_first(self.fitted_groups(residual, &all, GROUP_SETS));
         let most = found.iter().map(|f| f.0).fold(0.0, f64::max);
-        // The best stand first; among those that are as good, the shorter.
-        found.sort_by(|a, b| {
-            let good = |f: &(f64, usize, Hypothesis)| f.0 < AS_GOOD * most;
-            (good(a), if good(a) { 0 } else { a.1 })
-                .cmp(&(good(b), if good(b) { 0 } else { b.1 }))
-                .then(b.0.total_cmp(&a.0))
-        });
-        found.truncate(MOST);
-        found
-            .into_iter()
-            .filter(|f| f.0 > 0.3 * most)
+        (found.into_iter().filter(|f| f.0 > SHARE * most))
             .map(|f| f.2)
+            .collect()
+    }
+
+    /// Those that go with the heading or the place and explain more than a least log-likelihood of a strong signal, in which noise
+    /// hides nothing.
+    pub(super) fn screen_groups_over_the_floor(&self, residual: &White, least: f64) -> Vec<Hypothesis> {
+        let all = self.groups(|probe| !probe.is_tried_apart() && probe.goes_with_the_pose());
+        let found = best_first(self.fitted_groups(residual, &all, 1));
+        (found.into_iter().filter(|f| f.0 > least)).map(|f| f.2).collect()
+    }
+
+    fn groups(&self, are: impl Fn(&Probe) -> bool) -> Vec<usize> {
+        (0..self.atlas.probes.len())
+            .filter(|&probe| *self.atlas.probes[probe].spec == UNLISTED && are(&self.atlas.probes[probe]))
             .collect()
     }
 
     /// A camera that looks at the floor at an angle, as far as that explains a residual, with the score that linear algebra gives
     /// it.
     pub(super) fn screen_tilt(&self, residual: &White) -> Option<(f64, Hypothesis)> {
-        let tilts: Vec<usize> = (0..self.atlas.probes.len())
-            .filter(|&probe| self.atlas.probes[probe].tilts())
-            .collect();
-        let (score, _, tilt) = self.fitted_groups(residual, &tilts).pop()?;
+        let tilts = self.groups(Probe::tilts);
+        let (score, _, tilt) = self.fitted_groups(residual, &tilts, GROUP_SETS).pop()?;
         Some((score, tilt))
     }
 
-    /// Groups at the sizes that linear algebra gives them, each with its score and number of coefficients.
-    fn fitted_groups(&self, residual: &White, groups: &[usize]) -> Vec<(f64, usize, Hypothesis)> {
+    /// What acts on a part of the floor about one of these places, with a soft edge or a sharp one, and explains a residual best at the
+    /// size that linear algebra gives it: the best of each target, best first, with its score.
+    pub(super) fn screen_areas(&self, residual: &White, places: &[Vec2]) -> Vec<(f64, Hypothesis)> {
+        /// Steps of a target at which it is simulated.
+        const STEPS: f64 = 3.0;
+        let (declared, probes) = (self.atlas.declared_mean(0..1), &self.atlas.probes);
+        let price = price(1 + AREA_ORIGIN.len(), self.atlas.layout.total_laps()) + (places.len() as f64).ln();
+        let at = |probe: usize, place: Vec2, steps: f64| {
+            let per_m = 1.0 / probes[probe].free[1].1;
+            let part = Part::group(&probes[probe], probe, &[steps, place.x * per_m, place.y * per_m]);
+            Hypothesis::of(Part { stride: 1.0, ..part })
+        };
+        let best_of_target = |probe: usize| {
+            let about = |place: &Vec2| {
+                let simulated = at(probe, *place, STEPS).settings(self.atlas);
+                let found = self.simulated_plainly(&simulated, 0..1)?;
+                let (multiple, gain) = solve(&[&self.atlas.white(&found, &declared)], residual);
+                Some((gain - price, at(probe, *place, STEPS * multiple[0])))
+            };
+            let about_each: Vec<_> = places.par_iter().filter_map(about).collect();
+            about_each.into_iter().max_by(|a, b| a.0.total_cmp(&b.0))
+        };
+        let areas = self.groups(Probe::is_an_area).into_iter();
+        let mut found: Vec<(f64, Hypothesis)> = areas.filter_map(best_of_target).collect();
+        found.sort_by(|a, b| b.0.total_cmp(&a.0));
+        found
+    }
+
+    /// Groups at the sizes that linear algebra gives them by so many data sets for each coefficient.
+    fn fitted_groups(&self, residual: &White, groups: &[usize], sets: u64) -> Vec<FittedGroup> {
         let jobs: Vec<(usize, usize)> = (groups.iter())
             .flat_map(|&probe| (0..self.atlas.probes[probe].free.len()).map(move |i| (probe, i)))
             .collect();
-        let actions = self.actions(&jobs, GROUP_SETS);
+        let actions = self.actions(&jobs, sets);
         // A group of which a part stops the robot has no sizes.
         let fitted = |&probe: &usize| {
             let columns = (jobs.iter().zip(&actions))
@@ -170,10 +233,8 @@ impl Trial<'_> {
     /// What settles like this and explains a residual best at the sizes that linear algebra gives, target by target.
     pub(super) fn screen_settling(&self, residual: &White, settling: &Settling) -> Vec<Hypothesis> {
         const MOST: usize = 2;
-        let jobs: Vec<(usize, usize)> = (0..self.atlas.probes.len())
-            .filter(|&probe| self.atlas.probes[probe].settles())
-            .map(|probe| (probe, 0))
-            .collect();
+        let settling_groups = self.groups(Probe::settles).into_iter();
+        let jobs: Vec<(usize, usize)> = settling_groups.map(|probe| (probe, 0)).collect();
         let actions = self.actions(&jobs, GROUP_SETS);
         let mut found: Vec<(f64, Hypothesis)> = (jobs.iter().zip(&actions))
             .filter_map(|(&(probe, _), action)| {
@@ -188,6 +249,23 @@ impl Trial<'_> {
         found.truncate(MOST);
         found.into_iter().map(|f| f.1).collect()
     }
+}
+
+/// A group's score, its number of coefficients, and the group at the sizes that linear algebra gives it.
+type FittedGroup = (f64, usize, Hypothesis);
+
+/// The best few groups: of those that are as good the shorter, before those that are not.
+fn best_first(mut found: Vec<FittedGroup>) -> Vec<FittedGroup> {
+    const MOST: usize = 3;
+    let most = found.iter().map(|f| f.0).fold(0.0, f64::max);
+    found.sort_by(|a, b| {
+        let good = |f: &FittedGroup| f.0 < AS_GOOD * most;
+        (good(a), if good(a) { 0 } else { a.1 })
+            .cmp(&(good(b), if good(b) { 0 } else { b.1 }))
+            .then(b.0.total_cmp(&a.0))
+    });
+    found.truncate(MOST);
+    found
 }
 
 /// Multiples of columns nearest to a target, and half the squared distance gained.

@@ -166,7 +166,11 @@ impl Trial<'_> {
     fn hunt_closer(&self, mut hunt: Hunt, levels: &[u64]) -> Option<Part> {
         let mut last = Vec::new();
         for &sets in levels {
+            let before = hunt.left;
             last = self.look_closer(&mut hunt, sets)?;
+            if self.is_in_vain(before, hunt.left) {
+                break;
+            }
         }
         // Sizes that are no worse than by 4 in squared distance bound the answer.
         let bound = hunt.left + 4.0;
@@ -176,6 +180,17 @@ impl Trial<'_> {
             .map(|found| (found.1 - hunt.size).abs());
         let error = as_good.fold(hunt.spacing / 2.0, f64::max);
         Some(Part::held(self.atlas, hunt.probe, hunt.size, error))
+    }
+
+    /// Whether a look closer that found this much left, and that much before, shows that something else than the size is wrong.
+    fn is_in_vain(&self, before: f64, left: f64) -> bool {
+        /// What is left, as a multiple of what chance leaves, from which on it may.
+        const FAR: f64 = 10.0;
+        /// Share of what is left that a look must have gained.
+        const SLOW: f64 = 0.1;
+        let chance = self.atlas.layout.len() as f64;
+        let beyond = left - chance;
+        beyond > FAR * chance && before - left < SLOW * beyond
     }
 
     /// Brings a hunt to the best of sizes about its own, with so many data sets at each; what these leave of the data.

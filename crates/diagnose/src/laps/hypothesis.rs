@@ -8,7 +8,7 @@ use super::atlas::Atlas;
 use super::part::{Freedom, Part, Shape};
 use super::screen::{at, worth};
 use super::tests_of_fit::Quadratic;
-use crate::candidate::{apart, round, take_mean_of_others, within};
+use crate::candidate::{apart, bounded, round, take_mean_of_others};
 
 /// Effects that act together.
 #[derive(Debug, Clone, PartialEq)]
@@ -35,7 +35,7 @@ impl Hypothesis {
             .collect()
     }
 
-    /// Whether an effect acts at a place of a wall, which is fitted too.
+    /// Whether an effect acts at a place of a wall or of the floor, which is fitted too.
     pub(super) fn has_place(&self, atlas: &Atlas) -> bool {
         self.parts.iter().any(|part| atlas.probes[part.probe].has_place())
     }
@@ -316,8 +316,7 @@ impl Hypothesis {
                 Some(i) => {
                     let runs = freedom.run.map_or(0..part.values.len(), |run| run..run + 1);
                     for values in &mut part.values[runs] {
-                        let param = spec.param(i);
-                        values[i] = param.map_or(values[i] + by, |param| within(values[i] + by, param));
+                        values[i] = bounded(spec, values, i, values[i] + by);
                     }
                 }
             }

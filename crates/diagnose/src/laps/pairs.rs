@@ -4,13 +4,14 @@ use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
 use rayon::prelude::*;
 
 use super::atlas::{Atlas, White};
-use super::hunt::Hunt;
+use super::hunt::{Hunt, Moved};
 use super::hypothesis::Hypothesis;
 use super::part::{Part, Shape};
 use super::refine::Descent;
 use super::rounds::{ROUNDS_BESIDE, ROUNDS_OF_SEVERAL, Rung, best_of};
 use super::screen::{BEYOND, Screened, price, tangent};
 use super::search::{BASES, Found, STRONG, Search, of_other_effects};
+use super::verdict::{faults_beside, stands_alone};
 
 /// A straight piece of a probe's path.
 pub(super) struct Piece {
@@ -225,10 +226,10 @@ impl Search<'_> {
     /// Pairs that are looked for together, and explain nearly all of a strong signal where they are simulated, tried to the end.
     pub(super) fn clear_pairs(&self) -> Vec<Found> {
         const NEARLY_ALL: f64 = 0.9;
-        let all = 0.5 * self.excess(self.residual);
-        if all < STRONG {
+        if !self.is_strong() {
             return Vec::new();
         }
+        let all = 0.5 * self.excess(self.residual);
         let best = self.together().first();
         if best.is_none_or(|best| best.score < NEARLY_ALL * all) {
             return Vec::new();
@@ -312,17 +313,24 @@ impl Search<'_> {
         })
     }
 
-    /// The best pairs of a single effect that explains nearly all, tried to the end: those with what explains best what it
-    /// leaves, if anything gains there what a further effect must, and a fair share of what the faults of models may. Beside an
-    /// effect that stands alone it must promise more, and by one size: effects change the scatter, and sizes that go over the
-    /// runs follow that.
-    pub(super) fn pairs_with(&self, single: &Found, stands: bool, faults: f64) -> Vec<Found> {
+    /// The best pairs of a single effect that explains nearly all, the first of those found, tried to the end: those with what explains
+    /// best what it leaves, if anything gains there what a further effect must, and a fair share of what the faults of models may.
+    /// Beside an effect that stands alone it must promise more, and by one size: effects change the scatter, and sizes that go over
+    /// the runs follow that. A size that jumps is looked for more closely first, and is then the first of those found.
+    pub(super) fn pairs_with_first(&self, found: &mut Vec<Found>) -> Vec<Found> {
         const FAIR_SHARE: f64 = 0.3;
         /// Score of the least that could turn out to be worth its numbers.
         const PROMISING: f64 = 5.0;
         const PROMISING_BESIDE: f64 = 10.0;
+        let Some(single) = found.first() else {
+            return Vec::new();
+        };
+        let (stands, faults) = (
+            stands_alone(&single.explanation),
+            faults_beside(&single.explanation),
+        );
         let least = FAIR_SHARE * faults;
-        let mut tried = Tried::new(&ROUNDS_BESIDE, single.explanation.score);
+        let mut tried = Tried::new(&ROUNDS_BESIDE, single.explanation.score + least);
         if !stands && !single.explanation.fits() {
             self.descend_on(&mut tried, self.pairs_about(single));
         }
@@ -346,8 +354,26 @@ impl Search<'_> {
         if !promises(&heard, PROMISING) {
             return self.with_exchanged(tried);
         }
+        if let Some(closer) = self.with_closer_sizes(single) {
+            found.insert(0, closer);
+            return self.pairs_with_first(found);
+        }
         self.descend_on(&mut tried, self.beside_of(&heard, &base, &single.left, &[]));
         self.with_exchanged(tried)
+    }
+
+    /// An explanation at better sizes of what jumps, if there are any: sizes are rough, and a further effect would make up for what they
+    /// are off.
+    fn with_closer_sizes(&self, found: &Found) -> Option<Found> {
+        /// Log-likelihood that is worth it.
+        const BETTER: f64 = 5.0;
+        if found.hypothesis.parts.iter().all(|part| part.held.is_none()) {
+            return None;
+        }
+        self.tell(format_args!("closer sizes of {}", found.explanation.label()));
+        let hunted = self.trial.hunt_again(&found.hypothesis, Moved::Little)?;
+        let closer = self.settled(&hunted)?;
+        (closer.explanation.score > found.explanation.score + BETTER).then_some(closer)
     }
 
     /// Whether the best leaves so little of a strong signal that an effect that jumps does not stand for either of its own.
@@ -370,10 +396,15 @@ impl Search<'_> {
 
     /// Pairs with either effect of the best one exchanged for others than were tried, tried to the end.
     fn with_exchanged(&self, mut tried: Tried) -> Vec<Found> {
-        // What leaves far too much lacks a third effect rather than another second one, and what is no better than fewer effects
-        // lacks none.
-        let worth_more = |best: &&Descent| best.score > tried.reached && !best.leaves_far_too_much();
-        if let Some(best) = best_of(&tried.descents).filter(worth_more) {
+        // What is no better than fewer effects lacks none.
+        const ERRORS: f64 = 2.0;
+        let may_be_better = |best: &Descent| best.score + ERRORS * best.score_error > tried.reached;
+        if !best_of(&tried.descents).is_some_and(may_be_better) {
+            return Vec::new();
+        }
+        // What leaves far too much lacks a third effect rather than another second one.
+        let lacks_none = |best: &&Descent| !best.leaves_far_too_much();
+        if let Some(best) = best_of(&tried.descents).filter(lacks_none) {
             let names = self.in_words(std::slice::from_ref(best));
             self.tell(format_args!("what else goes with either of {names}"));
             let exchanged = self.exchanged(best, &tried.starts);

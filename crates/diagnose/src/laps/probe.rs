@@ -157,9 +157,9 @@ impl Probe {
         self.free.len() == 2
     }
 
-    /// Whether it acts at a place of a wall; place and length are fitted with the size.
+    /// Whether it acts at a place of a wall or of the floor; place and length are fitted with the size.
     pub(super) fn has_place(&self) -> bool {
-        self.spec.place_of("position").is_some()
+        self.spec.place_of("position").is_some() || self.is_an_area()
     }
 
     /// Wall, position and length of a place where it acts with such values; `None` without a place.
@@ -376,7 +376,7 @@ pub(super) fn probes(physics_step_s: f64) -> Vec<Probe> {
         line("reading-gain", &[0.7, 0.83, 0.93, 1.07, 1.2, 1.4]),
         line("distance-scale", &[0.8, 0.9, 0.96, 1.04, 1.1, 1.25]),
         line("response-exponent", &[0.75, 0.87, 0.95, 1.05, 1.13, 1.3]),
-        line("ambient-offset", &[-40.0, -15.0, 15.0, 40.0, 90.0]),
+        line("ambient-offset", &[-90.0, -40.0, -15.0, 15.0, 40.0, 90.0]),
         line("sensor-rotation", &[-0.12, -0.06, -0.02, 0.02, 0.06, 0.12]),
         line("sensor-reach", &[0.7, 0.8, 0.88, 0.95, 1.06, 1.2]),
         sensors("one-sensor-gain", &[0.65, 0.86, 1.16, 1.5]),

@@ -242,12 +242,15 @@ impl Search<'_> {
             let closer = (scan.bottoms(&nothing, self.chance()).into_iter())
                 .filter_map(|hunt| self.trial.hunted_once(hunt));
             let hunt = Hunt::least_first(closer.collect()).into_iter().next()?;
-            let found = self.trial.hunted(&hunt)?;
-            let end = Descent::start(self.atlas(), &found);
-            let settled = self.trial.settle(&end)?;
-            Some(self.found(&settled))
+            self.settled(&self.trial.hunted(&hunt)?)
         };
         self.scanned().iter().filter_map(closer).collect()
+    }
+
+    /// A hypothesis simulated often enough to judge it, where it is.
+    pub(super) fn settled(&self, hypothesis: &Hypothesis) -> Option<Found> {
+        let end = Descent::start(self.atlas(), hypothesis);
+        Some(self.found(&self.trial.settle(&end)?))
     }
 
     /// Whether sizes all over the range of effects that jump were simulated already.

@@ -6,6 +6,8 @@ use std::fmt::Arguments;
 use std::ops::Range;
 use std::sync::OnceLock;
 
+use sim::Vec2;
+
 use super::atlas::{Atlas, White};
 use super::hypothesis::Hypothesis;
 use super::intervals::Interval;
@@ -42,6 +44,8 @@ pub(super) struct Search<'a> {
     pub(super) residual: &'a White,
     /// The laps of each run.
     pub(super) runs: &'a [Vec<ObservedLap>],
+    /// Places along the track, from the arena's middle, m.
+    pub(super) places: &'a [Vec2],
     pub(super) watch: &'a Watch<'a>,
     /// What effects that jump leave at sizes all over their range, once that was asked for.
     pub(super) scanned: OnceLock<Vec<Scan>>,
@@ -241,6 +245,33 @@ impl Search<'_> {
         self.try_rounds(start.iter(), &ROUNDS_OF_GROUPS)
     }
 
+    /// Causes without a name that go with the heading or the place and explain nearly all of a strong signal as far as linear algebra
+    /// tells, tried to the end; none where a size that jumps and another effect promise as much.
+    pub(super) fn over_the_floor(&self) -> Vec<Found> {
+        const NEARLY_ALL: f64 = 0.9;
+        let least = NEARLY_ALL * 0.5 * self.excess(self.residual);
+        if (self.screened_pairs_that_jump().first()).is_some_and(|best| best.score >= least) {
+            return Vec::new();
+        }
+        self.tell(format_args!("what goes with the place"));
+        let starts = self.trial.screen_groups_over_the_floor(self.residual, least);
+        self.try_rounds(starts.iter(), &ROUNDS_OF_GROUPS)
+    }
+
+    /// Causes without a name that act on a part of the floor and explain much about a place that is not the best yet, tried to the end.
+    pub(super) fn areas(&self) -> Vec<Found> {
+        /// Share of the signal that is much: where there was an area it was .55 to 1, elsewhere at most .25.
+        const MUCH: f64 = 0.4;
+        /// Share of what the best explains that another target must.
+        const RIVAL: f64 = 0.7;
+        self.tell(format_args!("parts of the floor"));
+        let screened = self.trial.screen_areas(self.residual, self.places);
+        let best = screened.first().map_or(0.0, |(score, _)| *score);
+        let least = (RIVAL * best).max(MUCH * 0.5 * self.excess(self.residual));
+        let starts = screened.iter().filter(|(score, _)| *score >= least);
+        self.try_rounds(starts.map(|(_, start)| start), &ROUNDS_OF_SEVERAL)
+    }
+
     /// An explanation with a cause without a name in place of an effect whose size is not steady but settles while a run goes
     /// on, tried to the end.
     pub(super) fn settling(&self, best: &Found) -> Vec<Found> {
@@ -294,6 +325,11 @@ impl Search<'_> {
 
     pub(super) fn tell(&self, what: Arguments<'_>) {
         (self.watch)(&what.to_string());
+    }
+
+    /// Whether the data depart far from the declared model.
+    pub(super) fn is_strong(&self) -> bool {
+        0.5 * self.excess(self.residual) >= STRONG
     }
 
     /// What is left of the data in squared distance beyond what chance leaves.

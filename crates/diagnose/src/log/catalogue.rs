@@ -35,7 +35,8 @@ pub(crate) struct Variant {
 }
 
 impl Variant {
-    fn linear(spec: &'static Spec, values: &[f64], steps: &[(usize, f64)]) -> Self {
+    /// A variant at its neutral values, of which some are fitted, each with its step.
+    pub(crate) fn linear(spec: &'static Spec, values: &[f64], steps: &[(usize, f64)]) -> Self {
         let free: Vec<usize> = steps.iter().map(|s| s.0).collect();
         let steps = steps.iter().map(|s| s.1).collect();
         Self {

@@ -9,7 +9,7 @@ use super::channels::Channel;
 use super::decide::{Decided, Decision, decision};
 use super::evidence::{Evidence, widened};
 use super::filter::MEASURED;
-use super::groups::{settling_variants, unlisted_variants};
+use super::groups::{area_variants, settling_variants, unlisted_variants};
 use super::implausible::{Implausible, take_out_spikes};
 use super::recut::recut;
 use super::refined::Refined;
@@ -272,6 +272,7 @@ impl Search<'_> {
         let settling = best.into_iter().flat_map(|best| &best.settings).map(stage);
         let variants: Vec<Variant> = (self.variants.iter().cloned())
             .chain(unlisted_variants())
+            .chain(area_variants())
             .chain(settling.flat_map(settling_variants))
             .collect();
         let rounding: Vec<Setting> = self

@@ -13,7 +13,7 @@ use super::rows::{LogRow, stretches};
 use super::screen::{Normal, normal_of};
 use super::steps::WHOLE;
 use crate::Error;
-use crate::candidate::{apart, stage_of, within};
+use crate::candidate::{apart, bounded, stage_of};
 
 /// A stretch of one run's log and what of it counts.
 #[derive(Debug, Clone)]
@@ -75,11 +75,14 @@ impl Knob {
     /// The settings with the value changed by a multiple of the step, kept in its range.
     pub(crate) fn turned(&self, settings: &[Setting], multiple: f64) -> Vec<Setting> {
         let mut turned = settings.to_vec();
-        let param = settings[self.setting].spec.params.get(self.value);
         let value = self.of(&mut turned);
         *value += multiple * self.step;
-        if let (false, Some(param)) = (self.slope, param) {
-            *value = within(*value, param);
+        let Setting { spec, pattern } = &settings[self.setting];
+        let (Pattern::Constant(values) | Pattern::ByTime { start: values, .. }) = pattern else {
+            return turned;
+        };
+        if !self.slope {
+            *value = bounded(spec, values, self.value, *value);
         }
         turned
     }

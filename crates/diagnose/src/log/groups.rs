@@ -2,8 +2,8 @@
 
 use sim::{Setting, Stage, UNLISTED};
 
-use super::catalogue::{Shape, Variant};
-use crate::candidate::{WORDS, stage_of, unlisted_values};
+use super::catalogue::Variant;
+use crate::candidate::{AREA, AREA_ORIGIN, WORDS, stage_of, unlisted_values};
 
 /// Times, s, between those of a lap and of a run, about which what settles is sought.
 const SETTLE_WITHIN_S: [f64; 7] = [15.0, 30.0, 60.0, 120.0, 240.0, 480.0, 960.0];
@@ -32,6 +32,20 @@ pub(crate) fn unlisted_variants() -> Vec<Variant> {
     UNLISTED.params[0].choices.iter().flat_map(of).flatten().collect()
 }
 
+/// Every target on a part of the floor, which is to be looked for from where it may be.
+pub(crate) fn area_variants() -> Vec<Variant> {
+    const STEP_M: f64 = 0.01;
+    const STEP_OF_SOFTNESS: f64 = 0.05;
+    let of = |target: &&'static str| {
+        let mut values = unlisted_values([target, "place", AREA], 1)?;
+        values.extend(AREA_ORIGIN);
+        let steps = [step_of(target), STEP_M, STEP_M, STEP_M, STEP_OF_SOFTNESS];
+        let steps: Vec<(usize, f64)> = (WORDS..).zip(steps).collect();
+        Some(Variant::linear(&UNLISTED, &values, &steps))
+    };
+    UNLISTED.params[0].choices.iter().filter_map(of).collect()
+}
+
 /// Each wheel's speed by its own angle.
 pub(crate) fn wheel_variants() -> Vec<Variant> {
     let of = |wheel| group(wheel, ["wheel angle", "harmonics"], &[1.0; 2]);
@@ -56,19 +70,16 @@ pub(crate) fn settling_variants(stage: Stage) -> Vec<Variant> {
 /// A target with a dependence on a basis, and the sizes of its terms relative to the target's step.
 fn group(target: &str, [dependence, basis]: [&str; 2], scales: &[f64]) -> Option<Variant> {
     let values = unlisted_values([target, dependence, basis], scales.len())?;
-    // About a percent, a millimetre, a count or a hundredth of a radian per second.
-    let step = match target {
+    let steps = scales.iter().map(|scale| step_of(target) * scale);
+    let steps: Vec<(usize, f64)> = (WORDS..).zip(steps).collect();
+    Some(Variant::linear(&UNLISTED, &values, &steps))
+}
+
+/// About a percent, a millimetre, a count or a hundredth of a radian per second.
+fn step_of(target: &str) -> f64 {
+    match target {
         "side slip" | "camera x" | "camera y" => 5e-4,
         "left-right difference" => 1.0,
         _ => 0.01,
-    };
-    let free: Vec<usize> = (WORDS..values.len()).collect();
-    Some(Variant {
-        spec: &UNLISTED,
-        shape: Shape::Linear,
-        values,
-        sizes: free.clone(),
-        free,
-        steps: scales.iter().map(|scale| step * scale).collect(),
-    })
+    }
 }

@@ -3,7 +3,7 @@
 use sim::{Model, Scene, Setting};
 
 use super::evidence::{Evidence, widened};
-use super::groups::unlisted_variants;
+use super::groups::{area_variants, unlisted_variants};
 use super::refine::{knobs_of, refine};
 use super::rows::LogRow;
 use super::steps::written_step;
@@ -27,7 +27,7 @@ pub fn log_separation(
         models: &models,
         ..masks
     };
-    let variants = [evidence.variants(), unlisted_variants()].concat();
+    let variants = [evidence.variants(), unlisted_variants(), area_variants()].concat();
     let knobs = knobs_of(rival, &variants);
     let best = refine(&evidence, rival.to_vec(), knobs, STEPS)?.log_likelihood;
     Some((2.0 * (evidence.likelihood(answer)? - best).max(0.0)).sqrt())

@@ -1,11 +1,11 @@
 //! Causes that are in no list.
 
-use sim::Stage;
+use sim::{Pattern, Setting, Stage, Vec2, unlisted_on_floor};
 
 use super::channels::{Channel, channels};
 use super::evidence::Evidence;
 use super::filter::MEASURED;
-use super::groups::unlisted_variants;
+use super::groups::{area_variants, unlisted_variants};
 use super::leads::{By, Lead, price};
 use super::refined::{Refined, together};
 use super::repeat::repeats;
@@ -13,6 +13,7 @@ use super::search::{FAULTS, STEPS, Search, screened};
 use super::settling::settling;
 use super::wheels::out_of_round;
 use crate::Cause;
+use crate::candidate::WORDS;
 
 /// A cause without a name: its best coefficients, unless it is noise.
 #[derive(Debug)]
@@ -76,6 +77,10 @@ impl Search<'_> {
         let variant = &groups[lead.variant];
         let setting = lead.start(variant);
         let refined = together(&self.evidence, &[(variant.clone(), setting)], self.total(), STEPS)?;
+        let refined = match self.on_part_of_the_floor(&refined) {
+            Some(area) if area.score() > refined.score() => area,
+            _ => refined,
+        };
         if refined.gain < listed {
             return None;
         }
@@ -83,6 +88,43 @@ impl Search<'_> {
             cause,
             refined: Some(refined),
         })
+    }
+
+    /// A cause that depends on the place as one that acts on a part of the floor, with a soft edge or a sharp one, about a place on the
+    /// track where it acts most.
+    fn on_part_of_the_floor(&self, cause: &Refined) -> Option<Refined> {
+        const PLACES: usize = 3;
+        const APART_M: f64 = 0.3;
+        const SOFTNESSES: [f64; 2] = [1.0, 0.25];
+        let Pattern::Constant(values) = &cause.settings[0].pattern else {
+            return None;
+        };
+        let variant = area_variants()
+            .into_iter()
+            .find(|area| area.values[..2] == values[..2])?;
+        let circuit = self.evidence.scene.circuit();
+        let mut places: Vec<(f64, Vec2)> = (circuit.gates.iter().map(|gate| gate.center - circuit.middle()))
+            .map(|place| (unlisted_on_floor(values, place), place))
+            .collect();
+        places.sort_by(|a, b| b.0.abs().total_cmp(&a.0.abs()));
+        let mut starts: Vec<(f64, Vec2)> = Vec::new();
+        for (amount, place) in places {
+            let is_apart = |(_, other): &(f64, Vec2)| place.distance(*other) > APART_M;
+            if starts.len() < PLACES && starts.iter().all(is_apart) {
+                starts.push((amount, place));
+            }
+        }
+        let refined = |&(amount, place): &(f64, Vec2), softness: f64| {
+            let mut area = variant.values.clone();
+            area[WORDS..WORDS + 3].copy_from_slice(&[amount, place.x, place.y]);
+            area[WORDS + 4] = softness;
+            let setting = Setting::constant(variant.spec, area);
+            together(&self.evidence, &[(variant.clone(), setting)], self.total(), STEPS)
+        };
+        (starts.iter())
+            .flat_map(|start| SOFTNESSES.map(|softness| refined(start, softness)))
+            .flatten()
+            .max_by(|a, b| a.gain.total_cmp(&b.gain))
     }
 
     /// What the innovations have that no noise of the best explanation gives, if it is worth more than `small` units of

@@ -27,7 +27,10 @@ const DEPENDS_ON: [&str; 8] = [
     "time",
     "wheel angle",
 ];
-const BASES: [&str; 3] = ["polynomial", "harmonics", "settling"];
+const BASES: [&str; 4] = ["polynomial", "harmonics", "settling", AREA];
+
+/// The basis of what acts on a part of the floor.
+const AREA: &str = "area";
 
 /// Values before the coefficients.
 const WORDS: usize = 3;
@@ -45,8 +48,10 @@ const WHEEL_RADIUS_M: f64 = 0.0205;
 /// commanded wheel speeds or their difference, right less left (m/s), the time since the run began (s), or the angle by which
 /// wheels have turned since then (rad): each wheel's own, for what is no wheel both in the mean. The
 /// polynomial is c0 + c1 u + c2 u^2 + ..., the harmonics c0 cos u + c1 sin u + c2 cos 2u + c3 sin 2u + ..., the settling
-/// c0 + c1 exp(-u / c2). A place on the floor has two coordinates (x, y) from the arena's middle (m), and for it any basis
-/// stands for the monomials 1, x, y, x^2, xy, y^2, ....
+/// c0 + c1 exp(-u / c2). A place on the floor has two coordinates (x, y) from the arena's middle (m): an area is
+/// c0 exp(-(d / c3)^(2 / c4) / 2) at the distance d from (c1, c2), a normal law's bell where its softness c4 is 1 or not given and a
+/// disc with an ever sharper edge down to 0.05, and any other basis stands for the monomials 1, x, y, x^2, xy, y^2, .... No other
+/// variable has areas.
 ///
 /// It is not in [`super::EFFECTS`], because it is no candidate by itself; [`super::find`] knows it.
 pub static UNLISTED: Spec = Spec {
@@ -106,13 +111,18 @@ pub fn unlisted_at(values: &[f64], variable: f64) -> f64 {
     match word(&BASES, values[2]) {
         "harmonics" => harmonics(coefficients, variable),
         "settling" => settling(coefficients, variable),
+        AREA => 0.0,
         _ => coefficients.iter().rev().fold(0.0, |sum, c| sum * variable + c),
     }
 }
 
 /// What an effect without a name that depends on the place does at a place, seen from the arena's middle, m.
 pub fn unlisted_on_floor(values: &[f64], from_middle: Vec2) -> f64 {
-    on_floor(&values[WORDS..], from_middle)
+    let coefficients = &values[WORDS..];
+    match word(&BASES, values[2]) {
+        AREA => area(coefficients, from_middle),
+        _ => monomials(coefficients, from_middle),
+    }
 }
 
 pub(super) fn unlisted_depends_on_time(values: &[f64]) -> bool {
@@ -136,8 +146,21 @@ fn settling(coefficients: &[f64], u: f64) -> f64 {
     }
 }
 
+/// Nothing where the fourth coefficient, the area's radius, is missing or not positive.
+fn area(coefficients: &[f64], at: Vec2) -> f64 {
+    const SHARPEST: f64 = 0.05;
+    match *coefficients {
+        [amount, x, y, radius_m, ref softness @ ..] if radius_m > 0.0 => {
+            let off = (at - Vec2::new(x, y)) / radius_m;
+            let softness = softness.first().map_or(1.0, |softness| softness.max(SHARPEST));
+            amount * (-0.5 * off.length_squared().powf(1.0 / softness)).exp()
+        }
+        _ => 0.0,
+    }
+}
+
 /// Monomials by rising degree, and in each degree by falling power of x.
-fn on_floor(coefficients: &[f64], at: Vec2) -> f64 {
+fn monomials(coefficients: &[f64], at: Vec2) -> f64 {
     let powers = (0..).flat_map(|degree: i32| (0..=degree).map(move |y| (degree - y, y)));
     coefficients
         .iter()

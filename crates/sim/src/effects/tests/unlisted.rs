@@ -95,6 +95,44 @@ fn camera_polynomial_over_the_floor() {
     assert!((seen - Vec2::new(0.9, expected)).length() < 1e-12, "{seen:?}");
 }
 
+#[test]
+fn an_area_of_the_floor_fades_as_softly_as_it_is_told() {
+    // A slower robot within 0.15 m of (0.9, 0.7), seen from the middle of a 1.4 m by 1.2 m arena.
+    let slower_at = |words: [&str; 3], coefficients: &[f64], x: f64, y: f64| {
+        let mut area = active("unlisted", &values(words, coefficients));
+        let now = moment(Pose::new(x, y, 0.0), 0.0, 0.032);
+        let wheels = WheelSpeeds {
+            left_m_s: 1.0,
+            right_m_s: 1.0,
+        };
+        1.0 - area.effect.ground(&area.values, &now, wheels).left_m_s
+    };
+    let words = ["wheel speed", "place", "area"];
+    let of = |x: f64, y: f64| slower_at(words, &[-0.2, 0.2, 0.1, 0.15], x, y);
+    assert!((of(0.9, 0.7) - 0.2).abs() < 1e-15);
+    for (x, y) in [(1.05, 0.7), (0.9, 0.55)] {
+        assert!((of(x, y) - 0.2 * (-0.5_f64).exp()).abs() < 1e-15);
+    }
+    assert!(of(0.9, 1.6) < 1e-8);
+    for (softness, off) in [(1.0, 0.5), (0.25, 0.0625), (0.0, 0.5_f64.powi(20))] {
+        let half_way = slower_at(
+            words,
+            &[-0.2, 0.2, 0.1, 0.15, softness],
+            0.9 + 0.15 * 0.5_f64.sqrt(),
+            0.7,
+        );
+        assert!((half_way - 0.2 * (-0.5 * off).exp()).abs() < 1e-15, "{softness}");
+    }
+    // Without a radius there is no area, and on a line neither.
+    for no_radius in [&[-0.2, 0.2, 0.1][..], &[-0.2, 0.2, 0.1, 0.0]] {
+        assert_eq!(slower_at(words, no_radius, 0.9, 0.7), 0.0);
+    }
+    assert_eq!(
+        unlisted_at(&values(["reading", "time", "area"], &[1.0; 4]), 1.0),
+        0.0
+    );
+}
+
 /// A camera that looks at the floor at an angle sees what is nearer to it larger.
 #[test]
 fn a_tilted_camera_scales_by_the_place() {
