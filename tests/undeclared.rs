@@ -66,13 +66,16 @@ static PUDDLE: Spec = Spec {
     build: || Box::new(Puddle),
 };
 
+/// The middle of the wet place, m.
+const PUDDLE_M: [f64; 2] = [1.0, 0.9];
+
 #[derive(Debug)]
 struct Puddle;
 
 impl Effect for Puddle {
     fn ground(&mut self, values: &[f64], now: &Moment, wheels: WheelSpeeds) -> WheelSpeeds {
         const RADIUS_M: f64 = 0.12;
-        let away = (now.pose.position - Vec2::new(1.0, 0.9)).length() / RADIUS_M;
+        let away = (now.pose.position - Vec2::new(PUDDLE_M[0], PUDDLE_M[1])).length() / RADIUS_M;
         WheelSpeeds {
             left_m_s: wheels.left_m_s * (1.0 - values[0] * (-0.5 * away * away).exp()),
             ..wheels
@@ -524,9 +527,22 @@ fn a_carpet_with_a_grain_has_no_name_in_logs() {
 }
 
 #[test]
-fn a_wet_place_on_the_floor_has_no_name_in_logs() {
+fn a_wet_place_on_the_floor_is_an_area_in_logs() {
+    const SHARE: f64 = 0.2;
     let scratch = Scratch::new();
-    let robot = Robot::with(Setting::constant(&PUDDLE, [0.2])).logged(&[3; 3]);
+    let robot = Robot::with(Setting::constant(&PUDDLE, [SHARE])).logged(&[3; 3]);
     robot.record(&scratch, "set");
-    never_a_listed_name(&trace(&scratch, "braitenberg", "set", &[]), "act");
+    let found = trace(&scratch, "braitenberg", "set", &[]);
+    says(&found, "explained", &["unlisted"]);
+    let effect = &found["effects"][0];
+    for (key, word) in [("stage", "act"), ("acts_on", "left wheel"), ("basis", "area")] {
+        assert_eq!(effect[key], word, "{found:#}");
+    }
+    let coefficient = |i: usize| effect["coefficients"][i].as_f64().unwrap();
+    assert!((coefficient(0) + SHARE).abs() < 0.1 * SHARE, "{found:#}");
+    let middle = Vec2::new(0.7 + coefficient(1), 0.6 + coefficient(2));
+    assert!(
+        (middle - Vec2::new(PUDDLE_M[0], PUDDLE_M[1])).length() < 0.03,
+        "{found:#}"
+    );
 }

@@ -1,9 +1,9 @@
 //! Causes without a name: groups of basis functions of what a cause may depend on.
 
 use nalgebra::{DMatrix, DVector};
-use rayon::prelude::*;
-use sim::{UNLISTED, Vec2};
+use sim::UNLISTED;
 
+use super::areas::areas;
 use super::atlas::White;
 use super::hypothesis::Hypothesis;
 use super::part::Part;
@@ -11,7 +11,7 @@ use super::probe::Probe;
 use super::screen::price;
 use super::steadiness::Settling;
 use super::trial::Trial;
-use crate::candidate::{AREA, AREA_ORIGIN, WORDS, unlisted_values};
+use crate::candidate::{WORDS, unlisted_values};
 
 /// Data sets simulated for each coefficient.
 const GROUP_SETS: u64 = 2;
@@ -30,7 +30,7 @@ pub(super) fn groups() -> Vec<Probe> {
         }
         probes.extend(group(target, ["time", SETTLING], &[1.0, 1.0], 0));
     }
-    probes.extend(AREA_TARGETS.into_iter().filter_map(area));
+    probes.extend(areas());
     probes.extend(group(("camera scale", 0.004), TILT, &[1.0, 2.0, 2.0], 1));
     for wheel in ["wheel speed", "left wheel", "right wheel"] {
         probes.extend(group((wheel, 0.02), [WHEEL_ANGLE, "harmonics"], &[1.0], 0));
@@ -52,19 +52,6 @@ fn group(
     Some(Probe::group(&UNLISTED, origin, free))
 }
 
-/// A target on a part of the floor: how much, where, how far and how softly are fitted.
-fn area((target, step): (&str, f64)) -> Option<Probe> {
-    const STEP_M: f64 = 0.03;
-    const STEP_OF_SOFTNESS: f64 = 0.15;
-    let mut origin = unlisted_values([target, "place", AREA], 1)?;
-    origin.extend(AREA_ORIGIN);
-    let free = [step, STEP_M, STEP_M, STEP_M, STEP_OF_SOFTNESS]
-        .into_iter()
-        .enumerate();
-    let free = free.map(|(i, step)| (WORDS + i, step)).collect();
-    Some(Probe::group(&UNLISTED, origin, free))
-}
-
 /// The basis of what settles while a run goes on. Only what was seen to settle is tried with it.
 const SETTLING: &str = "settling";
 
@@ -83,15 +70,6 @@ const TARGETS: [(&str, f64); 7] = [
     ("left-right difference", 6.0),
     ("camera x", 8e-4),
     ("camera y", 8e-4),
-];
-
-/// What a part of the floor may act on, with such steps.
-const AREA_TARGETS: [(&str, f64); 5] = [
-    ("yaw rate", 0.02),
-    ("wheel speed", 0.02),
-    ("left wheel", 0.02),
-    ("right wheel", 0.02),
-    ("reading", 0.04),
 ];
 
 /// What it may depend on, the basis, and the sizes of its terms relative to the step: arena coordinates reach .6 m,
@@ -121,11 +99,6 @@ impl Probe {
             .any(|word| self.is_group_with(1, word))
     }
 
-    /// Whether it acts on a part of the floor.
-    pub(super) fn is_an_area(&self) -> bool {
-        self.is_group_with(2, AREA)
-    }
-
     /// Whether it is a group of what settles while a run goes on.
     fn settles(&self) -> bool {
         self.is_group_with(2, SETTLING)
@@ -141,7 +114,7 @@ impl Probe {
         self.is_group_with(0, "camera scale")
     }
 
-    fn is_group_with(&self, choice: usize, word: &str) -> bool {
+    pub(super) fn is_group_with(&self, choice: usize, word: &str) -> bool {
         *self.spec == UNLISTED && self.spec.params[choice].choices[self.origin()[choice] as usize] == word
     }
 }
@@ -167,7 +140,7 @@ impl Trial<'_> {
         (found.into_iter().filter(|f| f.0 > least)).map(|f| f.2).collect()
     }
 
-    fn groups(&self, are: impl Fn(&Probe) -> bool) -> Vec<usize> {
+    pub(super) fn groups(&self, are: impl Fn(&Probe) -> bool) -> Vec<usize> {
         (0..self.atlas.probes.len())
             .filter(|&probe| *self.atlas.probes[probe].spec == UNLISTED && are(&self.atlas.probes[probe]))
             .collect()
@@ -179,34 +152,6 @@ impl Trial<'_> {
         let tilts = self.groups(Probe::tilts);
         let (score, _, tilt) = self.fitted_groups(residual, &tilts, GROUP_SETS).pop()?;
         Some((score, tilt))
-    }
-
-    /// What acts on a part of the floor about one of these places, with a soft edge or a sharp one, and explains a residual best at the
-    /// size that linear algebra gives it: the best of each target, best first, with its score.
-    pub(super) fn screen_areas(&self, residual: &White, places: &[Vec2]) -> Vec<(f64, Hypothesis)> {
-        /// Steps of a target at which it is simulated.
-        const STEPS: f64 = 3.0;
-        let (declared, probes) = (self.atlas.declared_mean(0..1), &self.atlas.probes);
-        let price = price(1 + AREA_ORIGIN.len(), self.atlas.layout.total_laps()) + (places.len() as f64).ln();
-        let at = |probe: usize, place: Vec2, steps: f64| {
-            let per_m = 1.0 / probes[probe].free[1].1;
-            let part = Part::group(&probes[probe], probe, &[steps, place.x * per_m, place.y * per_m]);
-            Hypothesis::of(Part { stride: 1.0, ..part })
-        };
-        let best_of_target = |probe: usize| {
-            let about = |place: &Vec2| {
-                let simulated = at(probe, *place, STEPS).settings(self.atlas);
-                let found = self.simulated_plainly(&simulated, 0..1)?;
-                let (multiple, gain) = solve(&[&self.atlas.white(&found, &declared)], residual);
-                Some((gain - price, at(probe, *place, STEPS * multiple[0])))
-            };
-            let about_each: Vec<_> = places.par_iter().filter_map(about).collect();
-            about_each.into_iter().max_by(|a, b| a.0.total_cmp(&b.0))
-        };
-        let areas = self.groups(Probe::is_an_area).into_iter();
-        let mut found: Vec<(f64, Hypothesis)> = areas.filter_map(best_of_target).collect();
-        found.sort_by(|a, b| b.0.total_cmp(&a.0));
-        found
     }
 
     /// Groups at the sizes that linear algebra gives them by so many data sets for each coefficient.
@@ -269,7 +214,7 @@ fn best_first(mut found: Vec<FittedGroup>) -> Vec<FittedGroup> {
 }
 
 /// Multiples of columns nearest to a target, and half the squared distance gained.
-fn solve(columns: &[&White], target: &White) -> (DVector<f64>, f64) {
+pub(super) fn solve(columns: &[&White], target: &White) -> (DVector<f64>, f64) {
     let count = columns.len();
     let normal = DMatrix::from_fn(count, count, |i, j| {
         // A little more on the diagonal keeps columns that are alike from having no solution.

@@ -9,6 +9,7 @@ mod tests_of_fit;
 mod unseen;
 
 // The declared model, what is tried on it, and how likely that makes the data.
+mod areas;
 mod atlas;
 mod hypothesis;
 mod likelihood;

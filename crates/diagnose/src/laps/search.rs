@@ -258,20 +258,6 @@ impl Search<'_> {
         self.try_rounds(starts.iter(), &ROUNDS_OF_GROUPS)
     }
 
-    /// Causes without a name that act on a part of the floor and explain much about a place that is not the best yet, tried to the end.
-    pub(super) fn areas(&self) -> Vec<Found> {
-        /// Share of the signal that is much: where there was an area it was .55 to 1, elsewhere at most .25.
-        const MUCH: f64 = 0.4;
-        /// Share of what the best explains that another target must.
-        const RIVAL: f64 = 0.7;
-        self.tell(format_args!("parts of the floor"));
-        let screened = self.trial.screen_areas(self.residual, self.places);
-        let best = screened.first().map_or(0.0, |(score, _)| *score);
-        let least = (RIVAL * best).max(MUCH * 0.5 * self.excess(self.residual));
-        let starts = screened.iter().filter(|(score, _)| *score >= least);
-        self.try_rounds(starts.map(|(_, start)| start), &ROUNDS_OF_SEVERAL)
-    }
-
     /// An explanation with a cause without a name in place of an effect whose size is not steady but settles while a run goes
     /// on, tried to the end.
     pub(super) fn settling(&self, best: &Found) -> Vec<Found> {

@@ -1,0 +1,95 @@
+//! Causes without a name that act on a part of the floor.
+
+use rayon::prelude::*;
+use sim::{UNLISTED, Vec2};
+
+use super::atlas::White;
+use super::groups::solve;
+use super::hypothesis::Hypothesis;
+use super::part::Part;
+use super::probe::Probe;
+use super::rounds::ROUNDS_OF_SEVERAL;
+use super::screen::price;
+use super::search::{Found, Search};
+use super::trial::Trial;
+use crate::candidate::{AREA, AREA_ORIGIN, WORDS, unlisted_values};
+
+/// What a part of the floor may act on, with such steps.
+const TARGETS: [(&str, f64); 5] = [
+    ("yaw rate", 0.02),
+    ("wheel speed", 0.02),
+    ("left wheel", 0.02),
+    ("right wheel", 0.02),
+    ("reading", 0.04),
+];
+
+/// Every target on a part of the floor, as probes that have no path but only numbers to fit.
+pub(super) fn areas() -> impl Iterator<Item = Probe> {
+    TARGETS.into_iter().filter_map(area)
+}
+
+/// A target on a part of the floor: how much, where, how far and how softly are fitted.
+fn area((target, step): (&str, f64)) -> Option<Probe> {
+    const STEP_M: f64 = 0.03;
+    const STEP_OF_SOFTNESS: f64 = 0.15;
+    let mut origin = unlisted_values([target, "place", AREA], 1)?;
+    origin.extend(AREA_ORIGIN);
+    let free = [step, STEP_M, STEP_M, STEP_M, STEP_OF_SOFTNESS]
+        .into_iter()
+        .enumerate();
+    let free = free.map(|(i, step)| (WORDS + i, step)).collect();
+    Some(Probe::group(&UNLISTED, origin, free))
+}
+
+impl Probe {
+    /// Whether it acts on a part of the floor.
+    pub(super) fn is_an_area(&self) -> bool {
+        self.is_group_with(2, AREA)
+    }
+}
+
+impl Trial<'_> {
+    /// What acts on a part of the floor about one of these places and explains a residual best at the size that linear algebra gives
+    /// it: the best of each target, best first, with its score.
+    fn screen_areas(&self, residual: &White, places: &[Vec2]) -> Vec<(f64, Hypothesis)> {
+        /// Steps of a target at which it is simulated.
+        const STEPS: f64 = 3.0;
+        let (declared, probes) = (self.atlas.declared_mean(0..1), &self.atlas.probes);
+        let price = price(1 + AREA_ORIGIN.len(), self.atlas.layout.total_laps()) + (places.len() as f64).ln();
+        let at = |probe: usize, place: Vec2, steps: f64| {
+            let per_m = 1.0 / probes[probe].free[1].1;
+            let part = Part::group(&probes[probe], probe, &[steps, place.x * per_m, place.y * per_m]);
+            Hypothesis::of(Part { stride: 1.0, ..part })
+        };
+        let best_of_target = |probe: usize| {
+            let about = |place: &Vec2| {
+                let simulated = at(probe, *place, STEPS).settings(self.atlas);
+                let found = self.simulated_plainly(&simulated, 0..1)?;
+                let (multiple, gain) = solve(&[&self.atlas.white(&found, &declared)], residual);
+                Some((gain - price, at(probe, *place, STEPS * multiple[0])))
+            };
+            let about_each: Vec<_> = places.par_iter().filter_map(about).collect();
+            about_each.into_iter().max_by(|a, b| a.0.total_cmp(&b.0))
+        };
+        let areas = self.groups(Probe::is_an_area).into_iter();
+        let mut found: Vec<(f64, Hypothesis)> = areas.filter_map(best_of_target).collect();
+        found.sort_by(|a, b| b.0.total_cmp(&a.0));
+        found
+    }
+}
+
+impl Search<'_> {
+    /// Causes without a name that act on a part of the floor and explain much about a place that is not the best yet, tried to the end.
+    pub(super) fn areas(&self) -> Vec<Found> {
+        /// Share of the signal that is much: where there was an area it was .55 to 1, elsewhere at most .25.
+        const MUCH: f64 = 0.4;
+        /// Share of what the best explains that another target must.
+        const RIVAL: f64 = 0.7;
+        self.tell(format_args!("parts of the floor"));
+        let screened = self.trial.screen_areas(self.residual, self.places);
+        let best = screened.first().map_or(0.0, |(score, _)| *score);
+        let least = (RIVAL * best).max(MUCH * 0.5 * self.excess(self.residual));
+        let starts = screened.iter().filter(|(score, _)| *score >= least);
+        self.try_rounds(starts.map(|(_, start)| start), &ROUNDS_OF_SEVERAL)
+    }
+}
