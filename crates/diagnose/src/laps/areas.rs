@@ -8,9 +8,9 @@ use super::groups::solve;
 use super::hypothesis::Hypothesis;
 use super::part::Part;
 use super::probe::Probe;
-use super::rounds::ROUNDS_OF_SEVERAL;
+use super::rounds::{ROUNDS_FROM_NEAR, ROUNDS_OF_SEVERAL};
 use super::screen::price;
-use super::search::{Found, Search};
+use super::search::{Found, Search, sort};
 use super::trial::Trial;
 use crate::candidate::{AREA, AREA_ORIGIN, WORDS, unlisted_values};
 
@@ -23,28 +23,37 @@ const TARGETS: [(&str, f64); 5] = [
     ("reading", 0.04),
 ];
 
-/// Every target on a part of the floor, as probes that have no path but only numbers to fit.
+/// Every target on a part of the floor, as probes that have no path but only numbers to fit: how much, where, how far, and how softly
+/// it ends, and the same without the last, as a normal law's bell. Of a bell its softness would only be unsure what else there is: a
+/// robot that crosses an area on one line hardly tells them apart.
 pub(super) fn areas() -> impl Iterator<Item = Probe> {
-    TARGETS.into_iter().filter_map(area)
-}
-
-/// A target on a part of the floor: how much, where, how far and how softly are fitted.
-fn area((target, step): (&str, f64)) -> Option<Probe> {
     const STEP_M: f64 = 0.03;
     const STEP_OF_SOFTNESS: f64 = 0.15;
-    let mut origin = unlisted_values([target, "place", AREA], 1)?;
-    origin.extend(AREA_ORIGIN);
-    let free = [step, STEP_M, STEP_M, STEP_M, STEP_OF_SOFTNESS]
-        .into_iter()
-        .enumerate();
-    let free = free.map(|(i, step)| (WORDS + i, step)).collect();
-    Some(Probe::group(&UNLISTED, origin, free))
+    let of = |(target, step): (&str, f64)| {
+        let mut origin = unlisted_values([target, "place", AREA], 1)?;
+        origin.extend(AREA_ORIGIN);
+        let steps = [step, STEP_M, STEP_M, STEP_M, STEP_OF_SOFTNESS];
+        let with = |numbers: usize| {
+            let free = (WORDS..).zip(steps).take(numbers).collect();
+            Probe::group(&UNLISTED, origin.clone(), free)
+        };
+        Some([with(steps.len()), with(BELL)])
+    };
+    TARGETS.into_iter().filter_map(of).flatten()
 }
+
+/// Numbers of a bell.
+const BELL: usize = AREA_ORIGIN.len();
 
 impl Probe {
     /// Whether it acts on a part of the floor.
     pub(super) fn is_an_area(&self) -> bool {
         self.is_group_with(2, AREA)
+    }
+
+    /// Whether it does so as a normal law's bell.
+    fn is_a_bell(&self) -> bool {
+        self.is_an_area() && self.free.len() == BELL
     }
 }
 
@@ -55,7 +64,7 @@ impl Trial<'_> {
         /// Steps of a target at which it is simulated.
         const STEPS: f64 = 3.0;
         let (declared, probes) = (self.atlas.declared_mean(0..1), &self.atlas.probes);
-        let price = price(1 + AREA_ORIGIN.len(), self.atlas.layout.total_laps()) + (places.len() as f64).ln();
+        let price = price(BELL + 1, self.atlas.layout.total_laps()) + (places.len() as f64).ln();
         let at = |probe: usize, place: Vec2, steps: f64| {
             let per_m = 1.0 / probes[probe].free[1].1;
             let part = Part::group(&probes[probe], probe, &[steps, place.x * per_m, place.y * per_m]);
@@ -71,7 +80,9 @@ impl Trial<'_> {
             let about_each: Vec<_> = places.par_iter().filter_map(about).collect();
             about_each.into_iter().max_by(|a, b| a.0.total_cmp(&b.0))
         };
-        let areas = self.groups(Probe::is_an_area).into_iter();
+        let areas = self
+            .groups(|probe| probe.is_an_area() && !probe.is_a_bell())
+            .into_iter();
         let mut found: Vec<(f64, Hypothesis)> = areas.filter_map(best_of_target).collect();
         found.sort_by(|a, b| b.0.total_cmp(&a.0));
         found
@@ -90,6 +101,27 @@ impl Search<'_> {
         let best = screened.first().map_or(0.0, |(score, _)| *score);
         let least = (RIVAL * best).max(MUCH * 0.5 * self.excess(self.residual));
         let starts = screened.iter().filter(|(score, _)| *score >= least);
-        self.try_rounds(starts.map(|(_, start)| start), &ROUNDS_OF_SEVERAL)
+        let mut found = self.try_rounds(starts.map(|(_, start)| start), &ROUNDS_OF_SEVERAL);
+        let bell = found.first().and_then(|best| self.as_a_bell(&best.hypothesis));
+        found.extend(self.try_rounds(bell.iter(), &ROUNDS_FROM_NEAR));
+        sort(&mut found);
+        found
+    }
+
+    /// An area as a normal law's bell; `None` of one that ends far more sharply.
+    fn as_a_bell(&self, area: &Hypothesis) -> Option<Hypothesis> {
+        const SOFT: f64 = 0.5;
+        let [part] = area.parts.as_slice() else {
+            return None;
+        };
+        let acts_on = |values: &[f64]| values[0];
+        let is_it = |&bell: &usize| acts_on(self.atlas().probes[bell].origin()) == acts_on(&part.values[0]);
+        let probe = self.trial.groups(Probe::is_a_bell).into_iter().find(is_it)?;
+        let mut part = Part {
+            probe,
+            ..part.clone()
+        };
+        let softness = std::mem::replace(&mut part.values[0][WORDS + BELL], AREA_ORIGIN[BELL - 1]);
+        (softness > SOFT).then(|| Hypothesis::of(part))
     }
 }

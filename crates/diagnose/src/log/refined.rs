@@ -73,6 +73,16 @@ impl Refined {
             .flatten()
     }
 
+    /// Makes errors at least as large as how far its values are from those of the same effects fitted from elsewhere.
+    pub(super) fn be_as_unsure_as_far_from(&mut self, other: &Self) {
+        let values = self.settings.iter().zip(&other.settings);
+        for ((own, other), errors) in values.zip(&mut self.standard_errors) {
+            for (error, (own, other)) in errors.iter_mut().zip(numbers(own).iter().zip(numbers(other))) {
+                *error = error.max((own - other).abs());
+            }
+        }
+    }
+
     /// The same with errors at least as large as those of fits to simulated logs of it (a parametric bootstrap; Efron and
     /// Tibshirani 1993): the filter is linear about a pose, from which large noise takes the robot far, and readings near
     /// edges do not count.
