@@ -69,11 +69,7 @@ pub(crate) fn summary(trace: &Trace) -> String {
         }
         (Verdict::Unexplained, _) | (_, None) => unexplained(trace),
         (v, Some(answer)) => {
-            let what: Vec<String> = answer
-                .effects
-                .iter()
-                .map(|effect| describe(trace, effect))
-                .collect();
+            let what = described(trace, &answer.effects);
             let rest = if v == Verdict::Explained && answer.remainder_p.is_some() && !answer.fits() {
                 " What remains is significant but small."
             } else if v == Verdict::PartlyExplained {
@@ -162,6 +158,11 @@ pub(crate) fn gates_csv(trace: &Trace) -> String {
         }
     }
     csv
+}
+
+/// Effects with their sizes, one by one, for a sentence.
+fn described(trace: &Trace, effects: &[Candidate]) -> Vec<String> {
+    effects.iter().map(|effect| describe(trace, effect)).collect()
 }
 
 /// An effect with its size, for a sentence.
@@ -366,11 +367,7 @@ fn units(gain: f64) -> String {
 fn sizes(trace: &Trace, explanation: &Explanation) -> String {
     match explanation.effects.as_slice() {
         [effect] if Cause::of(&effect.setting).is_none() => size(effect),
-        effects => (effects
-            .iter()
-            .map(|effect| describe(trace, effect))
-            .collect::<Vec<_>>())
-        .join(" + "),
+        effects => described(trace, effects).join(" + "),
     }
 }
 

@@ -10,7 +10,7 @@ use super::part::Part;
 use super::probe::Probe;
 use super::rounds::{ROUNDS_FROM_NEAR, ROUNDS_OF_SEVERAL};
 use super::screen::price;
-use super::search::{Found, Search, sort};
+use super::search::{Found, Search};
 use super::trial::Trial;
 use crate::candidate::{AREA, AREA_ORIGIN, WORDS, unlisted_values};
 
@@ -24,8 +24,8 @@ const TARGETS: [(&str, f64); 5] = [
 ];
 
 /// Every target on a part of the floor, as probes that have no path but only numbers to fit: how much, where, how far, and how softly
-/// it ends, and the same without the last, as a normal law's bell. Of a bell its softness would only be unsure what else there is: a
-/// robot that crosses an area on one line hardly tells them apart.
+/// it ends, and the same without the last, as a normal law's bell: a robot that crosses an area on one line hardly tells how far from how
+/// softly.
 pub(super) fn areas() -> impl Iterator<Item = Probe> {
     const STEP_M: f64 = 0.03;
     const STEP_OF_SOFTNESS: f64 = 0.15;
@@ -102,9 +102,15 @@ impl Search<'_> {
         let least = (RIVAL * best).max(MUCH * 0.5 * self.excess(self.residual));
         let starts = screened.iter().filter(|(score, _)| *score >= least);
         let mut found = self.try_rounds(starts.map(|(_, start)| start), &ROUNDS_OF_SEVERAL);
-        let bell = found.first().and_then(|best| self.as_a_bell(&best.hypothesis));
-        found.extend(self.try_rounds(bell.iter(), &ROUNDS_FROM_NEAR));
-        sort(&mut found);
+        if let Some(best) = found.first_mut()
+            && let Some(bell) = self.as_a_bell(&best.hypothesis)
+        {
+            let bells = self.try_rounds(std::iter::once(&bell), &ROUNDS_FROM_NEAR);
+            let better = |bell: &Found| bell.explanation.score > best.explanation.score;
+            if let Some(bell) = bells.into_iter().next().filter(better) {
+                *best = bell;
+            }
+        }
         found
     }
 

@@ -158,7 +158,7 @@ fn explain(search: &Search<'_>, mut found: Vec<Found>) -> Vec<Found> {
             return with_first(true, tilted, found);
         }
     }
-    let mut unnamed = Vec::new();
+    let (mut unnamed, mut knows_areas) = (Vec::new(), false);
     // Of an effect that jumps a descent finds the nearest good size, not the best.
     let jumps = found.first().is_some_and(|best| search.jumped(best));
     let needs_no_scan = |best: &Explanation| {
@@ -185,6 +185,7 @@ fn explain(search: &Search<'_>, mut found: Vec<Found>) -> Vec<Found> {
                     return with_first(true, tried, found);
                 }
                 unnamed.extend(tried);
+                knows_areas = true;
             }
             if !search.was_scanned() {
                 search.scan(&mut found);
@@ -225,7 +226,7 @@ fn explain(search: &Search<'_>, mut found: Vec<Found>) -> Vec<Found> {
         |best: &Explanation| best.share >= ALL_BUT_FAULTS || best.effects.len() > 1 && best.share >= ENOUGH;
     if !first_is(&found, |best| suffices(best) || nearly_all(best)) {
         unnamed.extend(search.unnamed(&found));
-        if !search.is_strong() {
+        if !knows_areas {
             unnamed.extend(search.areas());
         }
         sort(&mut unnamed);

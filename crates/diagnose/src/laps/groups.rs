@@ -140,6 +140,7 @@ impl Trial<'_> {
         (found.into_iter().filter(|f| f.0 > least)).map(|f| f.2).collect()
     }
 
+    /// The groups of which something holds, by their numbers.
     pub(super) fn groups(&self, are: impl Fn(&Probe) -> bool) -> Vec<usize> {
         (0..self.atlas.probes.len())
             .filter(|&probe| *self.atlas.probes[probe].spec == UNLISTED && are(&self.atlas.probes[probe]))
