@@ -456,7 +456,7 @@ mod tests {
         };
         is("reading-gain", 0, 0.7);
         is("crosstalk", 0, 0.2);
-        is("ambient-offset", 0, 130.0);
+        is("ambient-offset", 0, 180.0);
         is("acceleration-limit", 0, 1.46);
         // Mirror images are not simulated; the middle of a factor is one.
         is("camera-scale", 0, 0.016);
