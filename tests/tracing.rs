@@ -201,6 +201,15 @@ pub(crate) fn holds(effect: &Value, parameter: &str, truth: f64, neutral: f64) {
     );
 }
 
+/// The first effect must have no name and these words: its stage, what it acts on and depends on, its basis. Returns its coefficients.
+pub(crate) fn without_name(trace: &Value, words: [&str; 4]) -> Vec<f64> {
+    let effect = &trace["effects"][0];
+    let said = ["name", "stage", "acts_on", "depends_on", "basis"].map(|key| effect[key].as_str().unwrap());
+    assert_eq!((said[0], &said[1..]), ("unlisted", &words[..]), "{trace:#}");
+    let coefficients = effect["coefficients"].as_array().unwrap().iter();
+    coefficients.map(|number| number.as_f64().unwrap()).collect()
+}
+
 /// No listed effect is claimed: what is said has no name and sits in that stage, or nothing is said at all.
 pub(crate) fn never_a_listed_name(trace: &Value, stage: &str) {
     let verdict = trace["verdict"].as_str().unwrap();

@@ -8,7 +8,7 @@ use sim::{
 use crate::ground;
 use crate::support::Scratch;
 use crate::tracing::{
-    GAINS, LAPS, RUNS, Robot, holds, names, never_a_listed_name, says, share_signatures, trace,
+    GAINS, LAPS, RUNS, Robot, holds, names, never_a_listed_name, says, share_signatures, trace, without_name,
 };
 
 /// A listed effect, written anew under another name.
@@ -175,6 +175,10 @@ impl Effect for Tilted {
     }
 }
 
+/// What a trace says of sensors that warm up, and of a wheel out of round.
+const SETTLING: [&str; 4] = ["sense", "reading", "time", "settling"];
+const OUT_OF_ROUND: [&str; 4] = ["act", "right wheel", "wheel angle", "harmonics"];
+
 /// The robot whose left wheel is larger.
 pub(crate) fn limping() -> Robot {
     Robot::with(Setting::constant(&LIMP, [LIMPING]))
@@ -209,21 +213,8 @@ fn sensors_that_warm_up_have_no_name_and_settle() {
     Robot::with(Setting::constant(&WARMING, [SHARE])).record(&scratch, "set");
     let found = trace(&scratch, "braitenberg", "set", &[]);
     says(&found, "explained", &["unlisted"]);
-    let effect = &found["effects"][0];
-    for (key, word) in [
-        ("stage", "sense"),
-        ("acts_on", "reading"),
-        ("depends_on", "time"),
-        ("basis", "settling"),
-    ] {
-        assert_eq!(effect[key], word, "{found:#}");
-    }
-    let coefficients = effect["coefficients"].as_array().unwrap().iter();
-    let [end, more, time_s]: [f64; 3] = coefficients
-        .map(|number| number.as_f64().unwrap())
-        .collect::<Vec<f64>>()
-        .try_into()
-        .unwrap();
+    let coefficients = without_name(&found, SETTLING);
+    let [end, more, time_s]: [f64; 3] = coefficients.try_into().unwrap();
     for at_s in [100.0, 200.0, 400.0] {
         let said = end + more * (-at_s / time_s).exp();
         let true_share = SHARE * (1.0 - (-at_s / WARMING_S).exp());
@@ -415,15 +406,7 @@ fn a_wheel_out_of_round_is_known_by_how_laps_ripple() {
     Robot::with(Setting::constant(&LOBED, [SHARE])).record(&scratch, "set");
     let found = trace(&scratch, "braitenberg", "set", &[]);
     says(&found, "explained", &["unlisted"]);
-    let effect = &found["effects"][0];
-    for (key, word) in [
-        ("stage", "act"),
-        ("acts_on", "right wheel"),
-        ("depends_on", "wheel angle"),
-    ] {
-        assert_eq!(effect[key], word, "{found:#}");
-    }
-    let share = effect["coefficients"][0].as_f64().unwrap();
+    let share = without_name(&found, OUT_OF_ROUND)[0];
     assert!((share - SHARE).abs() < 0.15 * SHARE, "{found:#}");
 }
 
@@ -435,12 +418,8 @@ fn sensors_that_warm_up_settle_in_logs() {
     robot.logged(&[4; 3]).record(&scratch, "set");
     let found = trace(&scratch, "braitenberg", "set", &[]);
     says(&found, "explained", &["unlisted"]);
-    let effect = &found["effects"][0];
-    for (key, word) in [("stage", "sense"), ("acts_on", "reading"), ("basis", "settling")] {
-        assert_eq!(effect[key], word, "{found:#}");
-    }
-    for (i, truth) in [SHARE, -SHARE, WARMING_S].into_iter().enumerate() {
-        let said = effect["coefficients"][i].as_f64().unwrap();
+    let coefficients = without_name(&found, SETTLING);
+    for (said, truth) in coefficients.into_iter().zip([SHARE, -SHARE, WARMING_S]) {
         assert!((said / truth - 1.0).abs() < 0.15, "{found:#}");
     }
 }
@@ -455,10 +434,7 @@ fn a_wheel_out_of_round_is_one_wheel_in_logs() {
     robot.logged(&[3; 3]).record(&scratch, "set");
     let found = trace(&scratch, "rule-based", "set", &[]);
     says(&found, "explained", &["unlisted"]);
-    let effect = &found["effects"][0];
-    assert_eq!(effect["acts_on"], "right wheel", "{found:#}");
-    assert_eq!(effect["depends_on"], "wheel angle", "{found:#}");
-    let share = effect["coefficients"][0].as_f64().unwrap();
+    let share = without_name(&found, OUT_OF_ROUND)[0];
     assert!((share - SHARE).abs() < 0.05 * SHARE, "{found:#}");
 }
 
@@ -470,18 +446,10 @@ fn a_tilted_camera_is_known_by_its_scale_over_the_floor() {
     Robot::with(Setting::constant(&TILTED, [PER_M])).record(&scratch, "set");
     let found = trace(&scratch, "braitenberg", "set", &[]);
     says(&found, "explained", &["unlisted"]);
-    let effect = &found["effects"][0];
-    for (key, word) in [
-        ("stage", "observe"),
-        ("acts_on", "camera scale"),
-        ("depends_on", "place"),
-    ] {
-        assert_eq!(effect[key], word, "{found:#}");
-    }
-    let coefficient = |i: usize| effect["coefficients"][i].as_f64().unwrap();
-    assert!((coefficient(1) - PER_M).abs() < 0.1 * PER_M, "{found:#}");
+    let coefficients = without_name(&found, ["observe", "camera scale", "place", "polynomial"]);
+    assert!((coefficients[1] - PER_M).abs() < 0.1 * PER_M, "{found:#}");
     assert!(
-        coefficient(0) == 0.0 && coefficient(2).abs() < 0.1 * PER_M,
+        coefficients[0] == 0.0 && coefficients[2].abs() < 0.1 * PER_M,
         "{found:#}"
     );
 }
@@ -494,20 +462,12 @@ fn a_rug_is_an_area_of_the_floor_on_which_wheels_are_slower() {
     Robot::with(Setting::constant(&RUG, [SHARE])).record(&scratch, "set");
     let found = trace(&scratch, "braitenberg", "set", &[]);
     assert_ne!(found["verdict"], "unexplained", "{found:#}");
-    let effect = &found["effects"][0];
-    for (key, word) in [
-        ("name", "unlisted"),
-        ("stage", "act"),
-        ("acts_on", "wheel speed"),
-        ("depends_on", "place"),
-        ("basis", "area"),
-    ] {
-        assert_eq!(effect[key], word, "{found:#}");
-    }
-    let coefficient = |i: usize| effect["coefficients"][i].as_f64().unwrap();
-    assert!((coefficient(0) + SHARE).abs() < 0.1 * SHARE, "{found:#}");
+    let [share, x_m, ..] = without_name(&found, ["act", "wheel speed", "place", "area"])[..] else {
+        panic!("{found:#}");
+    };
+    assert!((share + SHARE).abs() < 0.1 * SHARE, "{found:#}");
     // Seen from the middle of the arena; how wide the rug is across the track no lap tells.
-    assert!((0.7 + coefficient(1) - RUG_M.0[0]).abs() < 0.05, "{found:#}");
+    assert!((0.7 + x_m - RUG_M.0[0]).abs() < 0.05, "{found:#}");
 }
 
 #[test]
@@ -534,13 +494,11 @@ fn a_wet_place_on_the_floor_is_an_area_in_logs() {
     robot.record(&scratch, "set");
     let found = trace(&scratch, "braitenberg", "set", &[]);
     says(&found, "explained", &["unlisted"]);
-    let effect = &found["effects"][0];
-    for (key, word) in [("stage", "act"), ("acts_on", "left wheel"), ("basis", "area")] {
-        assert_eq!(effect[key], word, "{found:#}");
-    }
-    let coefficient = |i: usize| effect["coefficients"][i].as_f64().unwrap();
-    assert!((coefficient(0) + SHARE).abs() < 0.1 * SHARE, "{found:#}");
-    let middle = Vec2::new(0.7 + coefficient(1), 0.6 + coefficient(2));
+    let [share, x_m, y_m, ..] = without_name(&found, ["act", "left wheel", "place", "area"])[..] else {
+        panic!("{found:#}");
+    };
+    assert!((share + SHARE).abs() < 0.1 * SHARE, "{found:#}");
+    let middle = Vec2::new(0.7 + x_m, 0.6 + y_m);
     assert!(
         (middle - Vec2::new(PUDDLE_M[0], PUDDLE_M[1])).length() < 0.03,
         "{found:#}"

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-use sim::{Param, Pattern, Setting, Spec, Stage, UNLISTED};
+use sim::{Area, Param, Pattern, Setting, Spec, Stage, UNLISTED, unlisted_area};
 
 use crate::Cause;
 
@@ -105,13 +105,7 @@ pub(crate) fn label(setting: &Setting) -> String {
 }
 
 /// Values of [`UNLISTED`] before its coefficients: what it acts on, what it depends on, and the basis.
-pub(crate) const WORDS: usize = 3;
-
-/// The basis of what acts on a part of the floor.
-pub(crate) const AREA: &str = "area";
-
-/// Coefficients of an area behind how much it does: where it is (x, y), its radius, its softness.
-pub(crate) const AREA_ORIGIN: [f64; 4] = [0.0, 0.0, 0.15, 1.0];
+pub(crate) const WORDS: usize = UNLISTED.params.len();
 
 /// The values of an effect without a name that does nothing yet, with so many coefficients; `None` if it knows no such word.
 pub(crate) fn unlisted_values(words: [&str; WORDS], coefficients: usize) -> Option<Vec<f64>> {
@@ -123,6 +117,17 @@ pub(crate) fn unlisted_values(words: [&str; WORDS], coefficients: usize) -> Opti
         .map(number)
         .collect::<Option<_>>()?;
     values.resize(WORDS + coefficients, 0.0);
+    Some(values)
+}
+
+/// The softness of an area that ends as a normal law's bell does.
+pub(crate) const OF_A_BELL: f64 = 1.0;
+
+/// The values of an area in the arena's middle that does nothing yet; `None` if nothing is known of such a target.
+pub(crate) fn area_values(target: &str) -> Option<Vec<f64>> {
+    const RADIUS_M: f64 = 0.15;
+    let mut values = unlisted_values([target, "place", Area::BASIS], 0)?;
+    values.extend([0.0, 0.0, 0.0, RADIUS_M, OF_A_BELL]);
     Some(values)
 }
 
@@ -148,8 +153,8 @@ pub(crate) fn within(value: f64, param: &Param) -> f64 {
 /// stands, to where they make a difference.
 pub(crate) fn bounded(spec: &Spec, values: &[f64], place: usize, value: f64) -> f64 {
     const RADIUS_M: [f64; 2] = [0.01, 1.0];
-    const SOFTNESS: [f64; 2] = [0.05, 2.0];
-    let is_area = *spec == UNLISTED && UNLISTED.params[2].choices[values[2] as usize] == AREA;
+    const SOFTNESS: [f64; 2] = [Area::SHARPEST, 2.0];
+    let is_area = *spec == UNLISTED && unlisted_area(values).is_some();
     match place.checked_sub(WORDS) {
         Some(3) if is_area => value.clamp(RADIUS_M[0], RADIUS_M[1]),
         Some(4) if is_area => value.clamp(SOFTNESS[0], SOFTNESS[1]),

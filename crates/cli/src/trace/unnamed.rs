@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use chart::{Axis, Color, Dash, Figure, Mark, Panel, Shape};
 use diagnose::{Candidate, Cause};
-use sim::{Pattern, Vec2, unlisted_at, unlisted_on_floor};
+use sim::{Pattern, Vec2, unlisted_area, unlisted_at, unlisted_on_floor};
 
 use super::Trace;
 use crate::experiments::{Block, Picture};
@@ -39,21 +39,22 @@ pub(super) fn unnamed(trace: &Trace) -> Option<Block> {
 /// A cause without a name with what is known of it, for a sentence.
 pub(super) fn in_words(trace: &Trace, effect: &Candidate, cause: &Cause) -> String {
     let acts_on = &cause.acts_on;
-    let (spec, numbers) = (effect.setting.spec, effect.setting.pattern.numbers());
-    let words = spec.params.len();
-    let is_area = spec.params[words - 1].choices[numbers[words - 1] as usize] == "area";
-    if !is_area || numbers.len() < words + 4 {
+    let numbers = effect.setting.pattern.numbers();
+    let Some(area) = unlisted_area(&numbers) else {
         return format!(
             "an effect without a name on the {acts_on} that depends on the {}",
             cause.depends_on
         );
-    }
-    let middle = trace.shown().0.setup.scene.circuit().middle();
-    let [amount, x, y, radius] = [(0, 0.0), (1, middle.x), (2, middle.y), (3, 0.0)]
-        .map(|(i, from)| with_error(from + numbers[words + i], effect.standard_errors[words + i]));
+    };
+    let middle = area.middle_m + trace.shown().0.setup.scene.circuit().middle();
+    let errors = &effect.standard_errors[effect.setting.spec.params.len()..];
     format!(
-        "an effect without a name on the {acts_on} in an area of the floor ({amount} {}, at x = {x} m, y = {y} m, radius {radius} m)",
-        unit(cause)
+        "an effect without a name on the {acts_on} in an area of the floor ({} {}, at x = {} m, y = {} m, radius {} m)",
+        with_error(area.amount, errors[0]),
+        unit(cause),
+        with_error(middle.x, errors[1]),
+        with_error(middle.y, errors[2]),
+        with_error(area.radius_m, errors[3]),
     )
 }
 

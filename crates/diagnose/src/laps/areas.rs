@@ -1,7 +1,7 @@
 //! Causes without a name that act on a part of the floor.
 
 use rayon::prelude::*;
-use sim::{UNLISTED, Vec2};
+use sim::{Area, UNLISTED, Vec2};
 
 use super::atlas::White;
 use super::groups::solve;
@@ -12,7 +12,7 @@ use super::rounds::{ROUNDS_FROM_NEAR, ROUNDS_OF_SEVERAL};
 use super::screen::price;
 use super::search::{Found, Search};
 use super::trial::Trial;
-use crate::candidate::{AREA, AREA_ORIGIN, WORDS, unlisted_values};
+use crate::candidate::{OF_A_BELL, WORDS, area_values};
 
 /// What a part of the floor may act on, with such steps.
 const TARGETS: [(&str, f64); 5] = [
@@ -30,8 +30,7 @@ pub(super) fn areas() -> impl Iterator<Item = Probe> {
     const STEP_M: f64 = 0.03;
     const STEP_OF_SOFTNESS: f64 = 0.15;
     let of = |(target, step): (&str, f64)| {
-        let mut origin = unlisted_values([target, "place", AREA], 1)?;
-        origin.extend(AREA_ORIGIN);
+        let origin = area_values(target)?;
         let steps = [step, STEP_M, STEP_M, STEP_M, STEP_OF_SOFTNESS];
         let with = |numbers: usize| {
             let free = (WORDS..).zip(steps).take(numbers).collect();
@@ -42,13 +41,13 @@ pub(super) fn areas() -> impl Iterator<Item = Probe> {
     TARGETS.into_iter().filter_map(of).flatten()
 }
 
-/// Numbers of a bell.
-const BELL: usize = AREA_ORIGIN.len();
+/// Numbers of a bell: how much, where and how far.
+const BELL: usize = 4;
 
 impl Probe {
     /// Whether it acts on a part of the floor.
     pub(super) fn is_an_area(&self) -> bool {
-        self.is_group_with(2, AREA)
+        self.is_group_with(2, Area::BASIS)
     }
 
     /// Whether it does so as a normal law's bell.
@@ -99,7 +98,7 @@ impl Search<'_> {
         self.tell(format_args!("parts of the floor"));
         let screened = self.trial.screen_areas(self.residual, self.places);
         let best = screened.first().map_or(0.0, |(score, _)| *score);
-        let least = (RIVAL * best).max(MUCH * 0.5 * self.excess(self.residual));
+        let least = (RIVAL * best).max(MUCH * self.signal());
         let starts = screened.iter().filter(|(score, _)| *score >= least);
         let mut found = self.try_rounds(starts.map(|(_, start)| start), &ROUNDS_OF_SEVERAL);
         if let Some(best) = found.first_mut()
@@ -127,7 +126,7 @@ impl Search<'_> {
             probe,
             ..part.clone()
         };
-        let softness = std::mem::replace(&mut part.values[0][WORDS + BELL], AREA_ORIGIN[BELL - 1]);
+        let softness = std::mem::replace(&mut part.values[0][WORDS + BELL], OF_A_BELL);
         (softness > SOFT).then(|| Hypothesis::of(part))
     }
 }

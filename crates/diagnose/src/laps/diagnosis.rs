@@ -158,7 +158,7 @@ fn explain(search: &Search<'_>, mut found: Vec<Found>) -> Vec<Found> {
             return with_first(true, tilted, found);
         }
     }
-    let (mut unnamed, mut knows_areas) = (Vec::new(), false);
+    let mut unnamed: Option<Vec<Found>> = None;
     // Of an effect that jumps a descent finds the nearest good size, not the best.
     let jumps = found.first().is_some_and(|best| search.jumped(best));
     let needs_no_scan = |best: &Explanation| {
@@ -184,8 +184,7 @@ fn explain(search: &Search<'_>, mut found: Vec<Found>) -> Vec<Found> {
                 if first_is(&tried, leaves_nothing_to_ask) {
                     return with_first(true, tried, found);
                 }
-                unnamed.extend(tried);
-                knows_areas = true;
+                unnamed.get_or_insert_default().extend(tried);
             }
             if !search.was_scanned() {
                 search.scan(&mut found);
@@ -225,10 +224,8 @@ fn explain(search: &Search<'_>, mut found: Vec<Found>) -> Vec<Found> {
     let nearly_all =
         |best: &Explanation| best.share >= ALL_BUT_FAULTS || best.effects.len() > 1 && best.share >= ENOUGH;
     if !first_is(&found, |best| suffices(best) || nearly_all(best)) {
+        let mut unnamed = unnamed.unwrap_or_else(|| search.areas());
         unnamed.extend(search.unnamed(&found));
-        if !knows_areas {
-            unnamed.extend(search.areas());
-        }
         sort(&mut unnamed);
         found = unless_named(found, unnamed);
     }

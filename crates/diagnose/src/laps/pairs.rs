@@ -10,7 +10,7 @@ use super::part::{Part, Shape};
 use super::refine::Descent;
 use super::rounds::{ROUNDS_BESIDE, ROUNDS_OF_SEVERAL, Rung, best_of};
 use super::screen::{BEYOND, Screened, price, tangent};
-use super::search::{BASES, Found, STRONG, Search, of_other_effects};
+use super::search::{BASES, Found, NEARLY_ALL, STRONG, Search, of_other_effects};
 use super::verdict::{faults_beside, stands_alone};
 
 /// A straight piece of a probe's path.
@@ -225,13 +225,11 @@ impl Tried {
 impl Search<'_> {
     /// Pairs that are looked for together, and explain nearly all of a strong signal where they are simulated, tried to the end.
     pub(super) fn clear_pairs(&self) -> Vec<Found> {
-        const NEARLY_ALL: f64 = 0.9;
         if !self.is_strong() {
             return Vec::new();
         }
-        let all = 0.5 * self.excess(self.residual);
         let best = self.together().first();
-        if best.is_none_or(|best| best.score < NEARLY_ALL * all) {
+        if best.is_none_or(|best| best.score < NEARLY_ALL * self.signal()) {
             return Vec::new();
         }
         let mut tried = Tried::new(&ROUNDS_OF_SEVERAL, f64::NEG_INFINITY);

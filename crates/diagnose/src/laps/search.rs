@@ -65,6 +65,9 @@ pub(super) const WEAK: f64 = 400.0;
 /// tells of a cause that has none.
 pub(super) const STRONG: f64 = 2000.0;
 
+/// Share of the signal of which hardly another cause explains as much.
+pub(super) const NEARLY_ALL: f64 = 0.9;
+
 impl<'a> Search<'a> {
     pub(super) fn atlas(&self) -> &'a Atlas {
         self.trial.atlas
@@ -248,8 +251,7 @@ impl Search<'_> {
     /// Causes without a name that go with the heading or the place and explain nearly all of a strong signal as far as linear algebra
     /// tells, tried to the end; none where a size that jumps and another effect promise as much.
     pub(super) fn over_the_floor(&self) -> Vec<Found> {
-        const NEARLY_ALL: f64 = 0.9;
-        let least = NEARLY_ALL * 0.5 * self.excess(self.residual);
+        let least = NEARLY_ALL * self.signal();
         if (self.screened_pairs_that_jump().first()).is_some_and(|best| best.score >= least) {
             return Vec::new();
         }
@@ -315,7 +317,12 @@ impl Search<'_> {
 
     /// Whether the data depart far from the declared model.
     pub(super) fn is_strong(&self) -> bool {
-        0.5 * self.excess(self.residual) >= STRONG
+        self.signal() >= STRONG
+    }
+
+    /// The log-likelihood that an explanation gains which leaves what chance does.
+    pub(super) fn signal(&self) -> f64 {
+        0.5 * self.excess(self.residual)
     }
 
     /// What is left of the data in squared distance beyond what chance leaves.

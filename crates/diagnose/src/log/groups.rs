@@ -3,7 +3,7 @@
 use sim::{Setting, Stage, UNLISTED};
 
 use super::catalogue::Variant;
-use crate::candidate::{AREA, AREA_ORIGIN, WORDS, stage_of, unlisted_values};
+use crate::candidate::{WORDS, area_values, stage_of, unlisted_values};
 
 /// Times, s, between those of a lap and of a run, about which what settles is sought.
 const SETTLE_WITHIN_S: [f64; 7] = [15.0, 30.0, 60.0, 120.0, 240.0, 480.0, 960.0];
@@ -37,8 +37,7 @@ pub(crate) fn area_variants() -> Vec<Variant> {
     const STEP_M: f64 = 0.01;
     const STEP_OF_SOFTNESS: f64 = 0.05;
     let of = |target: &&'static str| {
-        let mut values = unlisted_values([target, "place", AREA], 1)?;
-        values.extend(AREA_ORIGIN);
+        let values = area_values(target)?;
         let steps = [step_of(target), STEP_M, STEP_M, STEP_M, STEP_OF_SOFTNESS];
         let steps: Vec<(usize, f64)> = (WORDS..).zip(steps).collect();
         Some(Variant::linear(&UNLISTED, &values, &steps))

@@ -5,6 +5,7 @@
 //! the robot.
 
 mod act;
+mod area;
 mod chain;
 mod decide;
 mod observe;
@@ -23,10 +24,11 @@ use std::fmt::Debug;
 
 use track::Vec2;
 
+pub use area::Area;
 pub(crate) use chain::Chain;
 pub(crate) use setting::Active;
 pub use setting::{Pattern, Setting};
-pub use unlisted::{UNLISTED, unlisted_at, unlisted_on_floor};
+pub use unlisted::{UNLISTED, unlisted_area, unlisted_at, unlisted_on_floor};
 
 use crate::{Machine, Pose, Readings, Twist, WallPlace, WheelSpeeds};
 

@@ -2,6 +2,7 @@
 
 use track::Vec2;
 
+use super::area::Area;
 use super::{Effect, Hook, Moment, Param, Spec, Stage};
 use crate::{Machine, Readings, Twist, WheelSpeeds};
 
@@ -27,13 +28,10 @@ const DEPENDS_ON: [&str; 8] = [
     "time",
     "wheel angle",
 ];
-const BASES: [&str; 4] = ["polynomial", "harmonics", "settling", AREA];
-
-/// The basis of what acts on a part of the floor.
-const AREA: &str = "area";
+const BASES: [&str; 4] = ["polynomial", "harmonics", "settling", Area::BASIS];
 
 /// Values before the coefficients.
-const WORDS: usize = 3;
+const WORDS: usize = UNLISTED.params.len();
 
 /// Radius of the e-puck's wheels, m.
 const WHEEL_RADIUS_M: f64 = 0.0205;
@@ -48,10 +46,9 @@ const WHEEL_RADIUS_M: f64 = 0.0205;
 /// commanded wheel speeds or their difference, right less left (m/s), the time since the run began (s), or the angle by which
 /// wheels have turned since then (rad): each wheel's own, for what is no wheel both in the mean. The
 /// polynomial is c0 + c1 u + c2 u^2 + ..., the harmonics c0 cos u + c1 sin u + c2 cos 2u + c3 sin 2u + ..., the settling
-/// c0 + c1 exp(-u / c2). A place on the floor has two coordinates (x, y) from the arena's middle (m): an area is
-/// c0 exp(-(d / c3)^(2 / c4) / 2) at the distance d from (c1, c2), a normal law's bell where its softness c4 is 1 or not given and a
-/// disc with an ever sharper edge down to 0.05, and any other basis stands for the monomials 1, x, y, x^2, xy, y^2, .... No other
-/// variable has areas.
+/// c0 + c1 exp(-u / c2). A place on the floor has two coordinates (x, y) from the arena's middle (m): an [`Area`] does c0 about (c1, c2)
+/// with the radius c3 and the softness c4, which is 1 where it is not given, and any other basis stands for the monomials
+/// 1, x, y, x^2, xy, y^2, .... No other variable has areas.
 ///
 /// It is not in [`super::EFFECTS`], because it is no candidate by itself; [`super::find`] knows it.
 pub static UNLISTED: Spec = Spec {
@@ -111,7 +108,7 @@ pub fn unlisted_at(values: &[f64], variable: f64) -> f64 {
     match word(&BASES, values[2]) {
         "harmonics" => harmonics(coefficients, variable),
         "settling" => settling(coefficients, variable),
-        AREA => 0.0,
+        Area::BASIS => 0.0,
         _ => coefficients.iter().rev().fold(0.0, |sum, c| sum * variable + c),
     }
 }
@@ -120,9 +117,16 @@ pub fn unlisted_at(values: &[f64], variable: f64) -> f64 {
 pub fn unlisted_on_floor(values: &[f64], from_middle: Vec2) -> f64 {
     let coefficients = &values[WORDS..];
     match word(&BASES, values[2]) {
-        AREA => area(coefficients, from_middle),
+        Area::BASIS => Area::of(coefficients).map_or(0.0, |area| area.at(from_middle)),
         _ => monomials(coefficients, from_middle),
     }
+}
+
+/// The area of the floor that values of a setting of [`UNLISTED`] stand for, if they do.
+pub fn unlisted_area(values: &[f64]) -> Option<Area> {
+    let (words, coefficients) = values.split_at_checked(WORDS)?;
+    let is_area = word(&DEPENDS_ON, words[1]) == "place" && word(&BASES, words[2]) == Area::BASIS;
+    Area::of(coefficients).filter(|_| is_area)
 }
 
 pub(super) fn unlisted_depends_on_time(values: &[f64]) -> bool {
@@ -143,19 +147,6 @@ fn settling(coefficients: &[f64], u: f64) -> f64 {
         [end, more, scale, ..] if scale > 0.0 => end + more * (-u / scale).exp(),
         [end, ..] => end,
         [] => 0.0,
-    }
-}
-
-/// Nothing where the fourth coefficient, the area's radius, is missing or not positive.
-fn area(coefficients: &[f64], at: Vec2) -> f64 {
-    const SHARPEST: f64 = 0.05;
-    match *coefficients {
-        [amount, x, y, radius_m, ref softness @ ..] if radius_m > 0.0 => {
-            let off = (at - Vec2::new(x, y)) / radius_m;
-            let softness = softness.first().map_or(1.0, |softness| softness.max(SHARPEST));
-            amount * (-0.5 * off.length_squared().powf(1.0 / softness)).exp()
-        }
-        _ => 0.0,
     }
 }
 
