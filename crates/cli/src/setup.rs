@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use anyhow::{Context, Result, anyhow};
-use diagnose::{ObservedLap, Unseen};
+use diagnose::{Beginning, ObservedLap, ObservedRun, Unseen};
 use sim::{
     Beam, CasterKind, Circuit, Drive, Machine, Model, Mount, Pattern, ReadingNoise, Response, Robot,
     RunRules, Scene, Setting, Step, Streams, Vec2, WallRules,
@@ -73,13 +73,16 @@ impl Setup {
         unseen.through(laps, path, &self.scene.circuit().gates, self.model.run.way)
     }
 
-    /// Laps that were seen on a path of times in s and positions in m, as a diagnosis takes them.
-    pub(crate) fn observed(&self, seen: Vec<Lap>, path: &[(f64, Vec2)]) -> Vec<ObservedLap> {
+    /// A run with laps that were seen on a path of times in s and positions in m, as a diagnosis takes it.
+    pub(crate) fn observed(&self, seen: Vec<Lap>, path: &[(f64, Vec2)]) -> ObservedRun {
         let (gates, speed_m_s) = (
             &self.scene.circuit().gates,
             self.model.machine.controller.speed_m_s(),
         );
-        ObservedLap::on_path(seen, path, gates, self.model.run.way, speed_m_s)
+        ObservedRun {
+            laps: ObservedLap::on_path(seen, path, gates, self.model.run.way, speed_m_s),
+            beginning: Beginning::of(path),
+        }
     }
 }
 

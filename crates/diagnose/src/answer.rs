@@ -3,7 +3,7 @@
 use sim::{Pattern, Setting, Stage, UNLISTED};
 
 use crate::laps::SIGNIFICANT_P;
-use crate::{Candidate, FourNumbers};
+use crate::{Candidate, Departures};
 
 /// How much of the residual is explained.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -45,7 +45,7 @@ pub struct Explanation {
     /// Probability of what remains by chance; `None` where it was not looked at.
     pub remainder_p: Option<f64>,
     /// What remains, as laps tell it.
-    pub remainder: Option<FourNumbers>,
+    pub remainder: Option<Departures>,
 }
 
 impl Explanation {
@@ -69,8 +69,8 @@ impl Explanation {
 
     /// Share of what exceeds the declared model's expectation that it explains, in [0, 1]; `None` where laps alone tell it and that
     /// much of their four numbers is often chance, of which nothing is a share.
-    pub fn explained(&self, of_laps: Option<&FourNumbers>) -> Option<f64> {
-        let is_chance = of_laps.is_some_and(FourNumbers::excess_is_chance);
+    pub fn explained(&self, of_laps: Option<&Departures>) -> Option<f64> {
+        let is_chance = of_laps.is_some_and(Departures::excess_is_chance);
         (!is_chance).then(|| self.share.clamp(0.0, 1.0))
     }
 
@@ -189,12 +189,12 @@ impl Answer {
     /// Whether laps that it was not asked for agree with it, by how they depart from the declared model and, unless the robot then
     /// crashes, from the model with its effects: they do where they contradict nothing, or little of what they showed is left. Where
     /// nothing is claimed there is nothing to agree with.
-    pub fn agrees_with(&self, before: &FourNumbers, after: Option<&FourNumbers>) -> bool {
+    pub fn agrees_with(&self, before: &Departures, after: Option<&Departures>) -> bool {
         /// Probability below which laps contradict.
         const CONTRADICTS_P: f64 = 1e-5;
         /// Share of the excess that may be left all the same.
         const LITTLE: f64 = 0.2;
-        let agree = |after: &FourNumbers| {
+        let agree = |after: &Departures| {
             after.omnibus_p() >= CONTRADICTS_P || after.excess() < LITTLE * before.excess()
         };
         self.verdict == Verdict::Unexplained || after.is_some_and(agree)
@@ -288,11 +288,12 @@ mod tests {
         let four = |mean_q: f64| {
             let [mean, runs] = [(mean_q, 120), (300.0, 360)].map(|(q, freedom)| Quadratic::new(q, freedom));
             let [trend, noise] = [(134.0, 120), (9.0, 20)].map(|(q, freedom)| Quadratic::new(q, freedom));
-            FourNumbers {
+            Departures {
                 mean,
                 runs,
                 trend,
                 noise,
+                start: Quadratic::new(0.0, 0),
             }
         };
         let mut found = answer(1.0, 1.0).explanations.remove(0);

@@ -2,7 +2,7 @@
 
 use anyhow::{Context, Result};
 use diagnose::{
-    Answer, Atlas, Baselines, Detectable, Explanation, FourNumbers, LogDiagnosis, LoggedRun, ObservedLap,
+    Answer, Atlas, Baselines, Departures, Detectable, Explanation, LogDiagnosis, LoggedRun, ObservedRun,
     Verdict, Watch, diagnose_logs,
 };
 use sim::{Pattern, Setting, Vec2};
@@ -10,7 +10,7 @@ use sim::{Pattern, Setting, Vec2};
 use super::atlas::{Purpose, atlas};
 use super::cache::Cache;
 use super::logs::Logs;
-use super::recording::{Recording, Seeds, observed_laps, simulate_all};
+use super::recording::{Recording, Seeds, observed_runs, simulate_all};
 use crate::session::Session;
 
 /// An answer from logs beside what the laps make of it.
@@ -18,7 +18,7 @@ use crate::session::Session;
 pub(crate) struct FromLogs {
     pub(crate) logs: LogDiagnosis,
     /// How the laps depart from the model with the answer's effects; `None` where the robot crashes.
-    pub(crate) after: Option<FourNumbers>,
+    pub(crate) after: Option<Departures>,
     /// Whether the laps agree with the answer.
     pub(crate) confirmed: bool,
 }
@@ -27,13 +27,13 @@ pub(crate) struct FromLogs {
 pub(super) struct TracedLaps<'a> {
     pub(super) atlas: Atlas,
     recordings: Vec<&'a Recording>,
-    laps: Vec<Vec<ObservedLap>>,
+    runs: Vec<ObservedRun>,
     seed: u64,
 }
 
 /// What is claimed, and why.
 pub(super) struct Named {
-    pub(super) residual: FourNumbers,
+    pub(super) residual: Departures,
     pub(super) answer: Answer,
     pub(super) from_logs: Option<FromLogs>,
     pub(super) baselines: Option<Baselines>,
@@ -50,14 +50,14 @@ impl<'a> TracedLaps<'a> {
         cache: &Cache,
     ) -> Result<Self> {
         Ok(Self {
-            laps: observed_laps(&recordings)?,
+            runs: observed_runs(&recordings)?,
             atlas: atlas(session, &recordings, purpose, cache)?,
             recordings,
             seed: session.seed(),
         })
     }
 
-    fn simulate(&self, effects: &[Setting], set: u64) -> Option<Vec<Vec<ObservedLap>>> {
+    fn simulate(&self, effects: &[Setting], set: u64) -> Option<Vec<ObservedRun>> {
         let seeds = Seeds {
             session: self.seed,
             set,
@@ -67,9 +67,9 @@ impl<'a> TracedLaps<'a> {
 
     /// How the laps depart from the declared model, and from the model with these effects; the latter is `None` where the robot then
     /// crashes.
-    fn confirm(&self, effects: &[Setting]) -> Result<(FourNumbers, Option<FourNumbers>)> {
+    fn confirm(&self, effects: &[Setting]) -> Result<(Departures, Option<Departures>)> {
         let simulate = |effects: &[Setting], set: u64| self.simulate(effects, set);
-        Ok(self.atlas.confirm(&simulate, &self.laps, effects)?)
+        Ok(self.atlas.confirm(&simulate, &self.runs, effects)?)
     }
 
     /// Places along the track, from the arena's middle, m.
@@ -86,12 +86,12 @@ impl<'a> TracedLaps<'a> {
         let simulate = |effects: &[Setting], set: u64| self.simulate(effects, set);
         let found = self
             .atlas
-            .diagnose(&simulate, &self.laps, &self.places(), watch)?;
+            .diagnose(&simulate, &self.runs, &self.places(), watch)?;
         Ok(Named {
             residual: found.residual,
             answer: found.answer,
             from_logs: None,
-            baselines: Some(self.atlas.baselines(&self.laps)?),
+            baselines: Some(self.atlas.baselines(&self.runs)?),
             detectable: self.atlas.detectable(),
         })
     }

@@ -1,8 +1,6 @@
 //! `trace.json`.
 
-use diagnose::{
-    Candidate, Cause, Channel, Decided, Detectable, Explanation, FourNumbers, Quadratic, Verdict,
-};
+use diagnose::{Candidate, Cause, Channel, Decided, Departures, Detectable, Explanation, Quadratic, Verdict};
 use serde_json::{Value, json};
 use sim::Pattern;
 
@@ -81,7 +79,7 @@ fn logs(found: &FromLogs) -> Value {
         "innovations": logs.channels.iter().map(channel).collect::<Vec<_>>(),
         "walls_cut_at": { "points_per_span": logs.corners.per_span, "before": logs.corners.before },
         "confirmed_by_laps": found.confirmed,
-        "laps_after": found.after.as_ref().map(four),
+        "laps_after": found.after.as_ref().map(departures),
     })
 }
 
@@ -97,9 +95,9 @@ fn quadratic(q: &Quadratic) -> Value {
     json!({ "q": q.q, "df": q.freedom, "excess": q.excess(), "p": q.p })
 }
 
-fn four(numbers: &FourNumbers) -> Value {
+fn departures(numbers: &Departures) -> Value {
     (numbers.named().into_iter())
-        .map(|(name, number)| (name.to_owned(), quadratic(number)))
+        .map(|(name, number)| (name.to_owned(), quadratic(&number)))
         .collect::<serde_json::Map<_, _>>()
         .into()
 }
@@ -119,11 +117,11 @@ fn residual(trace: &Trace) -> Value {
         "where": numbers.departing(),
         "acts_on": trace.answer.cause.as_ref().map(|cause| &cause.acts_on),
         "depends_on": trace.answer.cause.as_ref().map(|cause| &cause.depends_on),
-        "numbers": four(numbers),
+        "numbers": departures(numbers),
     })
 }
 
-fn effects(answer: &Explanation, rivals: &[Explanation], laps: Option<&FourNumbers>) -> Vec<Value> {
+fn effects(answer: &Explanation, rivals: &[Explanation], laps: Option<&Departures>) -> Vec<Value> {
     let count = answer.effects.len() as f64;
     let names = answer.names();
     let rivals: Vec<Vec<&str>> = rivals
@@ -224,12 +222,12 @@ pub(crate) fn parameters(effect: &Candidate) -> Vec<Value> {
     }
 }
 
-fn candidate(explanation: &Explanation, laps: Option<&FourNumbers>) -> Value {
+fn candidate(explanation: &Explanation, laps: Option<&Departures>) -> Value {
     json!({
         "names": explanation.names(), "label": explanation.label(),
         "score": explanation.score, "gain": explanation.gain, "share": explanation.explained(laps),
         "parameters": explanation.effects.iter().map(parameters).collect::<Vec<_>>(),
-        "remainder": explanation.remainder.as_ref().map(four), "remainder_p": explanation.remainder_p,
+        "remainder": explanation.remainder.as_ref().map(departures), "remainder_p": explanation.remainder_p,
     })
 }
 

@@ -2,6 +2,7 @@
 
 mod answer;
 mod atlas;
+mod beginnings;
 mod cache;
 mod checks;
 mod document;
@@ -18,7 +19,7 @@ mod unnamed;
 use std::path::Path;
 
 use anyhow::Result;
-use diagnose::{Answer, Baselines, Decided, Detectable, FourNumbers};
+use diagnose::{Answer, Baselines, Decided, Departures, Detectable};
 
 use answer::{FromLogs, TracedLaps};
 use atlas::{Purpose, laps_simulated};
@@ -46,7 +47,7 @@ pub(crate) struct Trace {
     /// The measured data sets, each on the model that it declares.
     pub(crate) recordings: Vec<Recording>,
     /// How the laps depart from the declared model.
-    pub(crate) residual: FourNumbers,
+    pub(crate) residual: Departures,
     /// What is claimed.
     pub(crate) answer: Answer,
     /// What the robot's logs say, where there are logs.
@@ -66,7 +67,7 @@ pub(crate) struct Trace {
 
 impl Trace {
     /// How the laps depart from the declared model, where they are all that was judged.
-    pub(crate) fn laps_alone(&self) -> Option<&FourNumbers> {
+    pub(crate) fn laps_alone(&self) -> Option<&Departures> {
         self.from_logs.is_none().then_some(&self.residual)
     }
 

@@ -1,7 +1,7 @@
 //! The experiment that would tell apart what these data do not.
 
 use anyhow::Result;
-use diagnose::{Explanation, LogRow, ObservedLap, Rival, log_separation, separations};
+use diagnose::{Explanation, LogRow, ObservedRun, Rival, log_separation, separations};
 use sim::{Controller, Setting, Stage, Step, Streams};
 
 use super::Trace;
@@ -170,11 +170,12 @@ fn by_laps(
     others: &[&Explanation],
     seed: u64,
 ) -> Option<Vec<(String, f64)>> {
-    let simulate = |effects: &[Setting], set: u64| -> Option<Vec<Vec<ObservedLap>>> {
+    let simulate = |effects: &[Setting], set: u64| -> Option<Vec<ObservedRun>> {
         let anywhere = |number| RunPlace {
             number,
             start: None,
             unseen: None,
+            begins: true,
         };
         let runs = (0..RUNS).map(|run| (LAPS, anywhere(run)));
         Recording::drive(setup, effects, Seeds { session: seed, set }, runs)

@@ -1,7 +1,7 @@
 //! A trace as a colleague would write it: sections of a report.
 
 use anyhow::Result;
-use diagnose::{Candidate, Cause, Decided, Explanation, FourNumbers, MeanLaps, Quadratic, Verdict, mean_lap};
+use diagnose::{Candidate, Cause, Decided, Departures, Explanation, MeanLaps, Quadratic, Verdict, mean_lap};
 use sim::Pattern;
 
 use super::answer::rivals;
@@ -286,18 +286,23 @@ fn residual(trace: &Trace) -> Vec<Block> {
         "What the laps hold beyond the expectation of the declared model, and of the model with the answer",
         &["", "freedom", "excess", "p", "with the answer", "p"],
     );
-    let named = |numbers: &FourNumbers| {
-        [
-            ("mean lap", numbers.mean),
-            ("run to run", numbers.runs),
-            ("drift within runs", numbers.trend),
-            ("noise", numbers.noise),
-        ]
+    let words = [
+        "mean lap",
+        "run to run",
+        "drift within runs",
+        "noise",
+        "start of runs",
+    ];
+    let named = |numbers: &Departures| {
+        words
+            .into_iter()
+            .zip(numbers.named().into_iter().map(|of| of.1))
+            .collect::<Vec<_>>()
     };
     let shown = |q: Quadratic| [format!("{:.0}", q.excess()), probability(q.p)];
     let remainder = answer.and_then(|answer| answer.remainder.as_ref()).map(named);
     for (i, (name, declared)) in named(&trace.residual).into_iter().enumerate() {
-        let left = remainder.map_or(["-".into(), "-".into()], |left| shown(left[i].1));
+        let left = (remainder.as_ref()).map_or(["-".into(), "-".into()], |left| shown(left[i].1));
         let row = [name.to_owned(), declared.freedom.to_string()];
         table.push(row.into_iter().chain(shown(declared)).chain(left));
     }

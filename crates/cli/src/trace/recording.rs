@@ -3,10 +3,11 @@
 use std::path::Path;
 
 use anyhow::{Context, Result, ensure};
-use diagnose::{ObservedLap, Unseen, coarse_unit_m};
+use diagnose::{ObservedRun, Unseen, coarse_unit_m};
 use sim::{Setting, Start, Step, Streams, Vec2, World};
 use track::Lap;
 
+use super::beginnings::begins;
 use super::checks::{belongs, is_timed};
 use crate::config::{Config, ModelFile};
 use crate::dataset::{DataSet, RunFile};
@@ -25,6 +26,8 @@ pub(crate) struct Recording {
     pub(super) cuts: Vec<Setup>,
     /// Where in its laps the camera did not see the robot, run by run.
     pub(super) unseen: Vec<Unseen>,
+    /// Whether it is known how each run begins.
+    pub(super) begins: Vec<bool>,
     /// What its positions are multiples of, m, if that is coarse: to the model that is noise of the camera.
     pub(super) written_m: Option<f64>,
     /// Text of the world file.
@@ -42,6 +45,8 @@ pub(crate) struct RunPlace<'a> {
     pub(crate) start: Option<Start>,
     /// Where in its laps the camera does not see it, if anywhere.
     pub(crate) unseen: Option<&'a Unseen>,
+    /// Whether the camera sees it begin.
+    pub(crate) begins: bool,
 }
 
 /// When and where a robot was seen, s and m.
@@ -67,6 +72,15 @@ impl RunPlace<'_> {
             closed = setup.seen_through(unseen, closed, &mut path);
         }
         Ok((closed, path))
+    }
+
+    /// A run in this place with laps that were seen on a path, as a diagnosis takes it.
+    fn observed(&self, setup: &Setup, laps: Vec<Lap>, path: &[(f64, Vec2)]) -> ObservedRun {
+        let observed = setup.observed(laps, path);
+        ObservedRun {
+            beginning: observed.beginning.filter(|_| self.begins),
+            ..observed
+        }
     }
 }
 
@@ -144,8 +158,10 @@ impl Recording {
                 model: setup.model.clone(),
             })
             .collect();
+        let begins = begins(session, &measured, &setup);
         Ok(Self {
             unseen: unseen(&measured, setup.model.run.control_step_s),
+            begins,
             written_m,
             config,
             setup,
@@ -161,11 +177,12 @@ impl Recording {
         self.measured.runs.iter().map(|run| run.laps.len()).collect()
     }
 
-    /// The laps, run by run.
-    pub(super) fn laps(&self) -> Vec<Vec<ObservedLap>> {
+    /// The measured runs.
+    fn observed(&self) -> Vec<ObservedRun> {
+        let places = self.places(&[]);
         let observed = |(i, run): (usize, &SampledRun)| {
             let path: Vec<_> = self.measured.seen(i).collect();
-            self.setup.observed(run.laps.clone(), &path)
+            places[i].observed(&self.setup, run.laps.clone(), &path)
         };
         self.measured.runs.iter().enumerate().map(observed).collect()
     }
@@ -226,12 +243,13 @@ impl Recording {
                 number: self.first_run + i,
                 start: changes.then(|| run.start()),
                 unseen: Some(unseen).filter(|unseen| !unseen.is_nothing()),
+                begins: self.begins[i],
             })
             .collect()
     }
 
     /// One simulated data set of this one's shape; `None` where a run does not complete its laps.
-    pub(super) fn simulate(&self, effects: &[Setting], seeds: Seeds) -> Option<Vec<Vec<ObservedLap>>> {
+    pub(super) fn simulate(&self, effects: &[Setting], seeds: Seeds) -> Option<Vec<ObservedRun>> {
         self.simulate_at(self.places(effects), &self.setup, effects, seeds)
     }
 
@@ -241,7 +259,7 @@ impl Recording {
         setup: &Setup,
         effects: &[Setting],
         seeds: Seeds,
-    ) -> Option<Vec<Vec<ObservedLap>>> {
+    ) -> Option<Vec<ObservedRun>> {
         self.simulate_at(self.places(&[]), setup, effects, seeds)
     }
 
@@ -251,7 +269,7 @@ impl Recording {
         setup: &Setup,
         effects: &[Setting],
         seeds: Seeds,
-    ) -> Option<Vec<Vec<ObservedLap>>> {
+    ) -> Option<Vec<ObservedRun>> {
         Self::drive(setup, effects, seeds, self.shape().into_iter().zip(places))
     }
 
@@ -261,7 +279,7 @@ impl Recording {
         effects: &[Setting],
         seeds: Seeds,
         runs: impl Iterator<Item = (usize, RunPlace<'a>)>,
-    ) -> Option<Vec<Vec<ObservedLap>>> {
+    ) -> Option<Vec<ObservedRun>> {
         if interrupt::check().is_err() {
             return None;
         }
@@ -274,7 +292,7 @@ impl Recording {
                 run: run as u64,
             };
             let (closed, path) = place.drive(setup, &world, streams, laps).ok()?;
-            (closed.len() == laps).then(|| setup.observed(closed, &path))
+            (closed.len() == laps).then(|| place.observed(setup, closed, &path))
         };
         runs.enumerate().map(run).collect()
     }
@@ -299,7 +317,7 @@ pub(super) fn simulate_all(
     recordings: &[&Recording],
     effects: &[Setting],
     seeds: Seeds,
-) -> Option<Vec<Vec<ObservedLap>>> {
+) -> Option<Vec<ObservedRun>> {
     let parts = (recordings.iter()).map(|recording| recording.simulate(effects, seeds));
     Some(parts.collect::<Option<Vec<_>>>()?.concat())
 }
@@ -363,21 +381,23 @@ pub(super) fn files(recordings: &[Recording]) -> impl Iterator<Item = &RunFile> 
         .flat_map(|recording| &recording.measured.set.runs)
 }
 
-/// The laps of every run of some recordings.
+/// Every run of some recordings, with its laps.
 ///
 /// # Errors
 /// A run of which too few laps count.
-pub(super) fn observed_laps(recordings: &[&Recording]) -> Result<Vec<Vec<ObservedLap>>> {
-    let laps: Vec<Vec<ObservedLap>> = recordings.iter().flat_map(|recording| recording.laps()).collect();
+pub(super) fn observed_runs(recordings: &[&Recording]) -> Result<Vec<ObservedRun>> {
+    let observed: Vec<ObservedRun> = (recordings.iter())
+        .flat_map(|recording| recording.observed())
+        .collect();
     let measured = || recordings.iter().map(|recording| &recording.measured);
     let files = measured().flat_map(|measured| &measured.set.runs);
     let runs = measured().flat_map(|measured| &measured.runs);
-    for ((run, file), laps) in runs.zip(files).zip(&laps) {
+    for ((run, file), observed) in runs.zip(files).zip(&observed) {
         ensure!(
-            laps.len() >= 3,
+            observed.laps.len() >= 3,
             "{}: {} whole laps after the first: at least 3 in every run are needed to trace anything; {}",
             file.path.display(),
-            laps.len(),
+            observed.laps.len(),
             if run.wanted < 3 {
                 "raise `laps` in dataset.toml if there are more, or measure longer"
             } else {
@@ -385,5 +405,5 @@ pub(super) fn observed_laps(recordings: &[&Recording]) -> Result<Vec<Vec<Observe
             }
         );
     }
-    Ok(laps)
+    Ok(observed)
 }

@@ -10,7 +10,7 @@ use sim::Setting;
 
 use super::expectation::{Expectation, Scatter};
 use super::layout::Layout;
-use super::observed::ObservedLap;
+use super::observed::ObservedRun;
 use super::probe::{Probe, probes};
 use super::summary::{BLOCKS, Summary};
 use crate::Error;
@@ -18,7 +18,7 @@ use crate::Error;
 /// Simulates one data set of the measured one's shape: laps of each run, or `None` where a run crashes or stops.
 ///
 /// The same number gives the same draws whatever the effects, so differences between effects are theirs alone.
-pub type Simulate<'a> = dyn Fn(&[Setting], u64) -> Option<Vec<Vec<ObservedLap>>> + Sync + 'a;
+pub type Simulate<'a> = dyn Fn(&[Setting], u64) -> Option<Vec<ObservedRun>> + Sync + 'a;
 
 /// Data sets simulated with the declared model.
 pub(super) const NULL_SETS: u64 = 200;
@@ -30,7 +30,7 @@ const PATH_SETS: u64 = 3;
 const CUT_SETS: u64 = 8;
 
 /// One data set in units of the declared model's scatter, less its expectation: for each run the mean lap times the root of the number of
-/// laps, then the trend times the root of the number of runs, then the second-order numbers; see [`Layout`]. Under the
+/// laps, then the trend times the root of the number of runs, then the second-order numbers and those of how runs begin; see [`Layout`]. Under the
 /// declared model its entries are independent with variance 1.
 pub(super) type White = DVector<f64>;
 
@@ -74,7 +74,7 @@ impl Clone for Spent {
 impl Atlas {
     /// Changes whenever the numbers of an atlas of the same model mean something else: atlases of another recipe are not to be
     /// read.
-    pub const RECIPE: u32 = 6;
+    pub const RECIPE: u32 = 7;
 
     /// Simulates everything for one recording; `cuts` simulate the declared model with walls that another program may have
     /// cut, which is no departure from it; `alike` says whether the declared model does the same in every run, whose physics steps
@@ -122,23 +122,17 @@ impl Atlas {
             .collect::<Vec<_>>()
             .into_iter()
             .collect::<Result<_, _>>()?;
-        let laps: Vec<usize> = simulate(&[], 0)
-            .ok_or(Error::DeclaredModelStops)?
-            .iter()
-            .map(Vec::len)
-            .collect();
         let expectation = Expectation::of(null.iter(), alike);
+        let first = simulate(&[], 0).ok_or(Error::DeclaredModelStops)?;
+        let layout = Layout::of_recording(&first, expectation.0[0].trend.len());
         let directions = directions(cuts, &null, tick);
-        let mean_laps = laps.iter().sum::<usize>() as f64 / laps.len() as f64;
+        let mean_laps = layout.total_laps() as f64 / layout.runs() as f64;
         let scatter = Scatter::of(null.iter().map(|summary| &summary.0[0]))
             .and_then(|scatter| scatter.left_open(&directions, mean_laps))
             .ok_or(Error::NoScatter)?;
         let mut atlas = Self {
             samples: null.iter().map(observed).collect(),
-            layout: Layout {
-                laps: vec![laps],
-                lap: expectation.0[0].trend.len(),
-            },
+            layout,
             null: expectation,
             alike,
             scatter: vec![scatter],
@@ -189,10 +183,7 @@ impl Atlas {
             alike: parts.iter().all(|part| part.alike),
             scatter: parts.iter().flat_map(|part| part.scatter.clone()).collect(),
             samples,
-            layout: Layout {
-                laps: parts.iter().flat_map(|part| part.layout.laps.clone()).collect(),
-                lap: parts[0].layout.lap,
-            },
+            layout: Layout::join(parts.iter().map(|part| &part.layout))?,
             paths: paths.collect(),
             probes,
             spent: Spent::default(),
@@ -278,10 +269,10 @@ impl Atlas {
     }
 
     /// What data say, if they have the shape that the atlas was made for, run by run.
-    pub(super) fn observed(&self, runs: &[Vec<ObservedLap>]) -> Result<Expectation, Error> {
+    pub(super) fn observed(&self, runs: &[ObservedRun]) -> Result<Expectation, Error> {
         let counts: Vec<usize> = self.layout.laps.iter().map(Vec::len).collect();
         let expected = self.layout.laps.concat();
-        let found: Vec<usize> = runs.iter().map(Vec::len).collect();
+        let found: Vec<usize> = runs.iter().map(|run| run.laps.len()).collect();
         if found != expected {
             return Err(Error::Shape { expected, found });
         }
@@ -289,11 +280,7 @@ impl Atlas {
     }
 
     /// What the data say without one run, which is one of several of its recording.
-    pub(super) fn observed_without(
-        &self,
-        runs: &[Vec<ObservedLap>],
-        run: usize,
-    ) -> Result<Expectation, Error> {
+    pub(super) fn observed_without(&self, runs: &[ObservedRun], run: usize) -> Result<Expectation, Error> {
         let recording = self.layout.places().nth(run).map(|at| at.0);
         let counts = (self.layout.laps.iter().enumerate())
             .map(|(g, laps)| laps.len() - usize::from(Some(g) == recording));

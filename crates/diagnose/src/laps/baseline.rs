@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::atlas::{Atlas, White};
 use super::expectation::Scatter;
-use super::observed::ObservedLap;
+use super::observed::ObservedRun;
 use super::screen::nearest;
 use super::summary::BLOCKS;
 use crate::Error;
@@ -26,7 +26,7 @@ impl Atlas {
     ///
     /// # Errors
     /// Runs of fewer than three laps, or of another shape than the atlas was made for.
-    pub fn baselines(&self, runs: &[Vec<ObservedLap>]) -> Result<Baselines, Error> {
+    pub fn baselines(&self, runs: &[ObservedRun]) -> Result<Baselines, Error> {
         let residual = self.white(&self.observed(runs)?, &self.null);
         let modes: Vec<DMatrix<f64>> = self.scatter.iter().map(two_modes).collect();
         Ok(Baselines {

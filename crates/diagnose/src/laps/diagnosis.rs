@@ -7,11 +7,11 @@ use sim::{Setting, Vec2};
 use super::atlas::{Atlas, Simulate};
 use super::hypothesis::Hypothesis;
 use super::memo::Memo;
-use super::observed::ObservedLap;
+use super::observed::ObservedRun;
 use super::ripple::Ripple;
 use super::screen::Screened;
 use super::search::{Found, Search, candidates, of_other_effects, sort};
-use super::tests_of_fit::{ALARM_P, FourNumbers};
+use super::tests_of_fit::{ALARM_P, Departures};
 use super::trial::Trial;
 use super::verdict::{
     ALL_BUT_FAULTS, ENOUGH, MOST, goes_over_runs_or_time, is_claimed, is_doubtful, leaves_nothing_to_ask,
@@ -29,7 +29,7 @@ const PATTERNS_OF_SEVERAL: usize = 2;
 #[derive(Debug, Clone)]
 pub struct LapDiagnosis {
     /// How the data depart from the declared model.
-    pub residual: FourNumbers,
+    pub residual: Departures,
     /// What is claimed.
     pub answer: Answer,
 }
@@ -43,7 +43,7 @@ impl Atlas {
     pub fn diagnose(
         &self,
         simulate: &Simulate<'_>,
-        runs: &[Vec<ObservedLap>],
+        runs: &[ObservedRun],
         places: &[Vec2],
         watch: &Watch<'_>,
     ) -> Result<LapDiagnosis, Error> {
@@ -51,7 +51,7 @@ impl Atlas {
         let simulate: &Simulate<'_> = &|effects, set| memo.simulate(effects, set);
         let data = self.observed(runs)?;
         let residual = self.white(&data, &self.null);
-        let numbers = FourNumbers::new(&residual, &self.layout);
+        let numbers = Departures::new(&residual, &self.layout);
         let screened = self.screen(&residual);
         let trial = Trial {
             atlas: self,
@@ -312,13 +312,13 @@ impl Atlas {
     pub fn confirm(
         &self,
         simulate: &Simulate<'_>,
-        runs: &[Vec<ObservedLap>],
+        runs: &[ObservedRun],
         effects: &[Setting],
-    ) -> Result<(FourNumbers, Option<FourNumbers>), Error> {
+    ) -> Result<(Departures, Option<Departures>), Error> {
         let memo = Memo::new(simulate);
         let simulate: &Simulate<'_> = &|effects, set| memo.simulate(effects, set);
         let data = self.observed(runs)?;
-        let before = FourNumbers::new(&self.white(&data, &self.null), &self.layout);
+        let before = Departures::new(&self.white(&data, &self.null), &self.layout);
         if effects.is_empty() {
             return Ok((before, Some(before)));
         }
@@ -331,7 +331,7 @@ impl Atlas {
         let after = trial.remainder(effects);
         Ok((
             before,
-            after.map(|residual| FourNumbers::new(&residual, &self.layout)),
+            after.map(|residual| Departures::new(&residual, &self.layout)),
         ))
     }
 }

@@ -82,7 +82,7 @@ impl Expected {
         let (runs, size) = (first.runs.len(), first.runs[0].mean.len());
         let sets = recordings.clone().count() as f64;
         let mut means = vec![DVector::zeros(size); runs];
-        let (mut trend, mut second) = (DVector::zeros(size), DVector::zeros(SECOND));
+        let (mut trend, mut second) = (DVector::zeros(size), DVector::zeros(first.second.len()));
         for recording in recordings {
             for (mean, run) in means.iter_mut().zip(&recording.runs) {
                 mean.axpy(1.0 / sets, &run.mean, 1.0);
@@ -135,13 +135,20 @@ impl Scatter {
     pub(super) fn of<'a>(recordings: impl Iterator<Item = &'a Recording> + Clone) -> Option<Self> {
         let sets = recordings.clone().count();
         let mean = Expected::of(recordings.clone(), true).second;
-        let mut second = DMatrix::zeros(SECOND, SECOND);
+        let freedom = sets as f64 - 1.0;
+        let mut second = DMatrix::zeros(mean.len(), mean.len());
         for recording in recordings.clone() {
             let deviation = &recording.second - &mean;
-            second.ger(1.0 / (sets as f64 - 1.0), &deviation, &deviation, 1.0);
+            second.ger(1.0 / freedom, &deviation, &deviation, 1.0);
         }
-        let spread = inflation(sets as f64 - 1.0, SECOND)?;
-        Self::of_second(recordings, second * spread)
+        // How runs begin has nothing to do with how their laps scatter.
+        let mut apart = DMatrix::zeros(mean.len(), mean.len());
+        for part in [0..SECOND, SECOND..mean.len()] {
+            let (at, size) = ((part.start, part.start), (part.len(), part.len()));
+            let own = second.view(at, size) * inflation(freedom, part.len())?;
+            apart.view_mut(at, size).copy_from(&own);
+        }
+        Self::of_second(recordings, apart)
     }
 
     /// As [`Scatter::of`] from few recordings: the second-order numbers are taken to be independent of each other.
@@ -211,7 +218,7 @@ impl Scatter {
         let apart = variances_of_second(recordings, copies)
             .component_div(&others.diagonal())
             .map(|ratio| ratio.ln() - bias);
-        let by_chance = SECOND as f64 * variance_of_log(freedom);
+        let by_chance = apart.len() as f64 * variance_of_log(freedom);
         let own = 1.0 - (by_chance / apart.norm_squared()).min(1.0);
         // What makes the inverse of a variance estimated with few degrees of freedom unbiased.
         let wider = own * own * 2.0 / freedom;
@@ -400,7 +407,7 @@ fn freedom_of(wider: f64, size: usize) -> f64 {
 /// Variances of the second-order numbers between recordings; of copies, one after the other, each about its own mean.
 fn variances_of_second(recordings: &[&Recording], copies: usize) -> DVector<f64> {
     let sets = recordings.len() / copies;
-    let mut variances = DVector::zeros(SECOND);
+    let mut variances = DVector::zeros(recordings[0].second.len());
     for copy in recordings.chunks(sets) {
         let sum: DVector<f64> = copy.iter().map(|recording| &recording.second).sum();
         let mean = sum / sets as f64;

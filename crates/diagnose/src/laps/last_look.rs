@@ -4,7 +4,7 @@ use sim::Setting;
 
 use super::hypothesis::Hypothesis;
 use super::intervals::Interval;
-use super::observed::ObservedLap;
+use super::observed::ObservedRun;
 use super::parabola::{Column, Local, Nearest};
 use super::part::Freedom;
 use super::refine::are_within_steps;
@@ -89,7 +89,7 @@ impl Trial<'_> {
     /// size of the run itself becomes the mean of the others'. Where the robot crashes beside the sizes, they stay.
     pub(super) fn leave_out(
         &self,
-        runs: &[Vec<ObservedLap>],
+        runs: &[ObservedRun],
         look: &LastLook,
     ) -> Result<Vec<Vec<Setting>>, Error> {
         let fit_without = |run: usize| {
@@ -106,7 +106,7 @@ impl Trial<'_> {
         &self,
         run: usize,
         local: &Local,
-        runs: &[Vec<ObservedLap>],
+        runs: &[ObservedRun],
         look: &LastLook,
     ) -> Result<Hypothesis, Error> {
         let (recording, place) = self.atlas.layout.places().nth(run).unwrap_or_default();

@@ -4,21 +4,43 @@ use std::ops::Range;
 
 use serde::{Deserialize, Serialize};
 
+use super::beginning::BEGINNING;
+use super::observed::ObservedRun;
 use super::summary::SECOND;
 
 /// The shape of one or more recordings, each of runs that were driven under the same declaration.
 ///
 /// A whitened data set holds, recording after recording: the mean lap of each run, the trend within the runs, the numbers of
-/// second order.
+/// second order, and how runs begin if that is known.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) struct Layout {
     /// Laps of each run, recording by recording.
     pub(super) laps: Vec<Vec<usize>>,
+    /// Whether it is known how any run of a recording begins.
+    pub(super) begins: Vec<bool>,
     /// Entries of one lap.
     pub(super) lap: usize,
 }
 
 impl Layout {
+    /// The shape of one recording of such runs, a lap of which has so many entries.
+    pub(super) fn of_recording(runs: &[ObservedRun], lap: usize) -> Self {
+        Self {
+            laps: vec![runs.iter().map(|run| run.laps.len()).collect()],
+            begins: vec![runs.iter().any(|run| run.beginning.is_some())],
+            lap,
+        }
+    }
+
+    /// The shape of several recordings together.
+    pub(super) fn join<'a>(parts: impl Iterator<Item = &'a Self> + Clone) -> Option<Self> {
+        Some(Self {
+            lap: parts.clone().next()?.lap,
+            laps: parts.clone().flat_map(|part| part.laps.clone()).collect(),
+            begins: parts.flat_map(|part| part.begins.clone()).collect(),
+        })
+    }
+
     /// Number of entries.
     pub(super) fn len(&self) -> usize {
         self.recording_start(self.laps.len())
@@ -60,14 +82,26 @@ impl Layout {
     }
 
     /// Entries of a recording's numbers of second order.
-    pub(super) fn second(&self, recording: usize) -> Range<usize> {
+    pub(super) fn noise(&self, recording: usize) -> Range<usize> {
         let start = self.trend(recording).end;
         start..start + SECOND
     }
 
+    /// Entries that say how runs of a recording begin.
+    pub(super) fn beginning(&self, recording: usize) -> Range<usize> {
+        let start = self.noise(recording).end;
+        start..start + if self.begins[recording] { BEGINNING } else { 0 }
+    }
+
+    /// Entries of a recording's numbers that are no mean laps: both of these.
+    pub(super) fn second(&self, recording: usize) -> Range<usize> {
+        self.noise(recording).start..self.beginning(recording).end
+    }
+
     fn recording_start(&self, recording: usize) -> usize {
-        let size = |laps: &Vec<usize>| (laps.len() + 1) * self.lap + SECOND;
-        self.laps[..recording].iter().map(size).sum()
+        recording
+            .checked_sub(1)
+            .map_or(0, |before| self.second(before).end)
     }
 }
 
@@ -85,13 +119,15 @@ mod tests {
     fn entries_of_two_recordings_follow_each_other_without_a_gap() {
         let layout = Layout {
             laps: vec![vec![5, 5], vec![7]],
+            begins: vec![true, false],
             lap: 12,
         };
         let mut all: Vec<usize> = Vec::new();
         all.extend(layout.run(0));
         all.extend(layout.run(1));
         all.extend(layout.trend(0));
-        all.extend(layout.second(0));
+        all.extend(layout.noise(0));
+        all.extend(layout.beginning(0));
         all.extend(layout.run(2));
         all.extend(layout.trend(1));
         all.extend(layout.second(1));

@@ -6,7 +6,7 @@ use std::sync::Mutex;
 use sim::Setting;
 
 use super::atlas::Simulate;
-use super::observed::ObservedLap;
+use super::observed::ObservedRun;
 
 /// Data sets that are kept: a search goes on from where it was a moment ago. Of 80 laps and 100 gates they take 64 MB.
 const KEPT: usize = 256;
@@ -16,7 +16,7 @@ struct Known {
     effects: Vec<Setting>,
     set: u64,
     /// The laps of its runs; `None` where one crashes or stops.
-    runs: Option<Vec<Vec<ObservedLap>>>,
+    runs: Option<Vec<ObservedRun>>,
 }
 
 /// A simulation that remembers its latest data sets.
@@ -35,7 +35,7 @@ impl<'a> Memo<'a> {
     }
 
     /// One data set; see [`Simulate`].
-    pub(super) fn simulate(&self, effects: &[Setting], set: u64) -> Option<Vec<Vec<ObservedLap>>> {
+    pub(super) fn simulate(&self, effects: &[Setting], set: u64) -> Option<Vec<ObservedRun>> {
         let is_it = |known: &&Known| known.set == set && known.effects == effects;
         if let Some(known) = self.known().iter().find(is_it) {
             return known.runs.clone();

@@ -1,6 +1,7 @@
 //! Diagnosis from laps that the camera saw.
 
 // What is measured and what is expected.
+mod beginning;
 mod expectation;
 mod layout;
 mod observed;
@@ -51,9 +52,10 @@ mod separation;
 
 pub use atlas::{Atlas, Simulate};
 pub use baseline::Baselines;
+pub use beginning::Beginning;
 pub use diagnosis::LapDiagnosis;
-pub use observed::ObservedLap;
+pub use observed::{ObservedLap, ObservedRun};
 pub use separation::{Rival, separations};
 pub(crate) use tests_of_fit::SIGNIFICANT_P;
-pub use tests_of_fit::{FourNumbers, Quadratic};
+pub use tests_of_fit::{Departures, Quadratic};
 pub use unseen::Unseen;

@@ -1,6 +1,28 @@
-//! Laps as a diagnosis takes them.
+//! Runs and laps as a diagnosis takes them.
 
 use track::{Gates, Lap, Vec2, Way, laps, moving_mean};
+
+use super::beginning::Beginning;
+
+/// A run as the gates saw it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ObservedRun {
+    /// Its closed laps that count.
+    pub laps: Vec<ObservedLap>,
+    /// How it began, if that is known.
+    pub beginning: Option<Beginning>,
+}
+
+impl ObservedRun {
+    /// A run of which nothing but its laps is known, seen without noise.
+    #[cfg(test)]
+    pub(super) fn exact(laps: impl IntoIterator<Item = Lap>) -> Self {
+        Self {
+            laps: laps.into_iter().map(ObservedLap::exact).collect(),
+            beginning: None,
+        }
+    }
+}
 
 /// A lap as the gates saw it.
 #[derive(Debug, Clone, PartialEq)]

@@ -203,8 +203,11 @@ impl Probe {
             .collect()
     }
 
-    /// A size so many times as far from nothing as another.
+    /// A size that does so many times as much as another; of a limit that does nothing where it is infinite, the inverse counts.
     pub(super) fn times(&self, size: f64, multiple: f64) -> f64 {
+        if self.limit {
+            return (size / multiple.max(f64::MIN_POSITIVE)).min(self.neutral);
+        }
         self.neutral + multiple * (size - self.neutral)
     }
 
@@ -491,6 +494,18 @@ mod tests {
         let light = probes.iter().find(|probe| probe.spec.name == "directional-light");
         let sizes: Vec<bool> = light.map_or(Vec::new(), |light| vec![light.is_size(0), light.is_size(1)]);
         assert_eq!(sizes.iter().filter(|is_size| **is_size).count(), 1);
+    }
+
+    #[test]
+    fn twice_a_lag_is_twice_its_time_and_twice_a_limit_is_half_of_it() {
+        let twice = |name: &str, size: f64| {
+            let probes = probes(0.032);
+            let found = probes.iter().find(|probe| probe.spec.name == name);
+            found.expect("the effect is tried").times(size, 2.0)
+        };
+        assert_eq!(twice("motor-lag", 0.1), 0.2);
+        assert!((twice("reading-gain", 1.1) - 1.2).abs() < 1e-12);
+        assert_eq!(twice("acceleration-limit", 0.3), 0.15);
     }
 
     #[test]

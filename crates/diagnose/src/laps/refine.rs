@@ -12,7 +12,7 @@ use super::parabola::{Column, Local, Nearest};
 use super::part::{Freedom, Part, Shape};
 use super::screen::price;
 use super::simulated::Evaluated;
-use super::tests_of_fit::{FourNumbers, HOPELESS_P, SIGNIFICANT_P};
+use super::tests_of_fit::{Departures, HOPELESS_P, SIGNIFICANT_P};
 use super::trial::Trial;
 
 /// What is simulated in a round of a descent.
@@ -93,7 +93,7 @@ pub(super) struct Descent {
     /// By how much the last round raised the score.
     pub(super) progress: f64,
     /// What it leaves, as the last round but a rough one saw it.
-    pub(super) remainder: Option<FourNumbers>,
+    pub(super) remainder: Option<Departures>,
     /// What was seen about it, and the moves since.
     near: Option<(Local, DVector<f64>)>,
     /// How often it was looked around.
@@ -198,7 +198,7 @@ impl Trial<'_> {
             score,
             score_error: fit.gain_error,
             progress: score - descent.score,
-            remainder: Some(FourNumbers::new(&fit.residual, &self.atlas.layout)),
+            remainder: Some(Departures::new(&fit.residual, &self.atlas.layout)),
             found,
             end: found.then_some(center),
             ..descent
@@ -244,7 +244,7 @@ impl Trial<'_> {
         let hypothesis = self.atlas.with_moves(&hypothesis, &freedoms, &moves);
         let found = full && is_settled(&moves, &nearest.covariance, &freedoms);
         let holds = are_within_steps(&moves, &freedoms);
-        let remainder = full.then(|| FourNumbers::new(&nearest.fit.residual, &self.atlas.layout));
+        let remainder = full.then(|| Departures::new(&nearest.fit.residual, &self.atlas.layout));
         for (i, freedom) in freedoms.iter_mut().enumerate() {
             // The parabola should hold where the answer may lie, and be wide enough for the noise of its points not to
             // pass for information.
@@ -287,7 +287,7 @@ impl Trial<'_> {
         let (gain, score_error) = self.likely_gain(&descent.hypothesis, &center, nearest.hoped)?;
         let Nearest { moves, errors, .. } = nearest;
         let found = full && is_settled(&moves, &nearest.covariance, &freedoms);
-        let remainder = Some(FourNumbers::new(&nearest.fit.residual, &self.atlas.layout));
+        let remainder = Some(Departures::new(&nearest.fit.residual, &self.atlas.layout));
         let at_rest =
             found && (moves.iter().zip(&errors)).all(|(moved, error)| moved.abs() < AT_REST * error);
         let (hypothesis, moved, end) = if at_rest {
@@ -376,7 +376,7 @@ impl Atlas {
             score,
             score_error: to.fit.gain_error,
             progress: score - descent.score,
-            remainder: full.then(|| FourNumbers::new(&to.fit.residual, &self.layout)),
+            remainder: full.then(|| Departures::new(&to.fit.residual, &self.layout)),
             near: None,
             looks: descent.looks + 1,
             holds: false,

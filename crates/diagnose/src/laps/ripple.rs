@@ -11,7 +11,7 @@ use statrs::statistics::{Data, OrderStatistics};
 
 use super::atlas::Atlas;
 use super::hypothesis::Hypothesis;
-use super::observed::ObservedLap;
+use super::observed::ObservedRun;
 use super::part::Part;
 use super::summary::{BLOCKS, deviations, lap_vector};
 use super::tests_of_fit::Quadratic;
@@ -72,7 +72,7 @@ fn wheel(atlas: &Atlas, probe: usize, share: f64) -> Hypothesis {
 
 impl Trial<'_> {
     /// The wheel whose lines measured laps have most of, beside what some effects make of them; `None` where the robot crashes.
-    pub(super) fn ripple(&self, runs: &[Vec<ObservedLap>], others: &Hypothesis) -> Option<Ripple> {
+    pub(super) fn ripple(&self, runs: &[ObservedRun], others: &Hypothesis) -> Option<Ripple> {
         let expected = self.spectra(others, SETS)?;
         let mean = mean(&expected);
         let missing = lines(&(spectrum(runs) - &mean));
@@ -129,9 +129,9 @@ fn mean(spectra: &[DVector<f64>]) -> DVector<f64> {
 
 /// Log power of how laps deviate sideways from the means of their run's quarters, from [`LEAST_CYCLES`] cycles per lap to one in
 /// two gates.
-fn spectrum(runs: &[Vec<ObservedLap>]) -> DVector<f64> {
+fn spectrum(runs: &[ObservedRun]) -> DVector<f64> {
     let vectors: Vec<Vec<DVector<f64>>> = (runs.iter())
-        .map(|laps| laps.iter().map(lap_vector).collect())
+        .map(|run| run.laps.iter().map(lap_vector).collect())
         .collect();
     let deviations: Vec<DVector<f64>> = deviations(&vectors).collect();
     let gates = deviations.first().map_or(0, |lap| lap.len() - BLOCKS);
@@ -169,7 +169,7 @@ mod tests {
     use super::*;
 
     /// Laps of 100 gates, each a wave with a phase of its own.
-    fn waves(cycles: f64, amplitude_m: f64) -> Vec<Vec<ObservedLap>> {
+    fn waves(cycles: f64, amplitude_m: f64) -> Vec<ObservedRun> {
         let lap = |number: usize| track::Lap {
             start_s: 70.0 * number as f64,
             end_s: 70.0 * (number + 1) as f64,
@@ -184,7 +184,7 @@ mod tests {
                 .collect(),
             missed: Vec::new(),
         };
-        vec![(0..16).map(lap).map(ObservedLap::exact).collect()]
+        vec![ObservedRun::exact((0..16).map(lap))]
     }
 
     #[test]

@@ -8,7 +8,7 @@ use super::part::Part;
 use super::refine::{CLOSE_SETS, Descent, Round, Settled};
 use super::search::{Found, Search, sort};
 use super::simulated::FINAL_SETS;
-use super::tests_of_fit::{FourNumbers, HOPELESS_P};
+use super::tests_of_fit::{Departures, HOPELESS_P};
 
 /// A rung of successive halving (Jamieson and Talwalkar 2016): a round of every descent, after which does not come back what lies
 /// behind the best by more than a log-likelihood and a share of the best one's.
@@ -237,8 +237,7 @@ impl Search<'_> {
         /// Laps of a data set of which that many are simulated; of smaller ones more, in the same time.
         const USUAL_LAPS: u64 = 80;
         let best = (settled.iter().map(|s| s.refined.score)).fold(f64::NEG_INFINITY, f64::max);
-        let leaves =
-            |s: &Settled| FourNumbers::new(&s.refined.fit.residual, &self.atlas().layout).omnibus_p();
+        let leaves = |s: &Settled| Departures::new(&s.refined.fit.residual, &self.atlas().layout).omnibus_p();
         let first = settled.iter().find(|s| s.refined.score == best);
         if first.is_some_and(|first| leaves(first) < HOPELESS_P) {
             return settled;

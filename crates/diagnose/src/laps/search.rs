@@ -11,14 +11,14 @@ use sim::Vec2;
 use super::atlas::{Atlas, White};
 use super::hypothesis::Hypothesis;
 use super::intervals::Interval;
-use super::observed::ObservedLap;
+use super::observed::ObservedRun;
 use super::pairs::ScreenedPair;
 use super::part::{Freedom, Shape};
 use super::refine::{Descent, Settled};
 use super::ripple::Ripple;
 use super::rounds::{ROUNDS, ROUNDS_FROM_NEAR, ROUNDS_OF_GROUPS, ROUNDS_OF_SEVERAL, Rung, best_of, near};
 use super::scans::Scan;
-use super::tests_of_fit::{FourNumbers, Quadratic, SIGNIFICANT_P};
+use super::tests_of_fit::{Departures, Quadratic, SIGNIFICANT_P};
 use super::trial::Trial;
 use super::verdict::is_noise;
 use crate::{Candidate, Explanation, Watch};
@@ -43,7 +43,7 @@ pub(super) struct Search<'a> {
     pub(super) trial: Trial<'a>,
     pub(super) residual: &'a White,
     /// The laps of each run.
-    pub(super) runs: &'a [Vec<ObservedLap>],
+    pub(super) runs: &'a [ObservedRun],
     /// Places along the track, from the arena's middle, m.
     pub(super) places: &'a [Vec2],
     pub(super) watch: &'a Watch<'a>,
@@ -338,7 +338,7 @@ impl Search<'_> {
     pub(super) fn found(&self, settled: &Settled) -> Found {
         let Settled { refined, evaluated } = settled;
         let atlas = self.atlas();
-        let remainder = FourNumbers::new(&refined.fit.residual, &atlas.layout);
+        let remainder = Departures::new(&refined.fit.residual, &atlas.layout);
         Found {
             gain_error: refined.fit.gain_error,
             left: atlas.white(self.trial.data, &evaluated.expectation),

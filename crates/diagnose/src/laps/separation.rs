@@ -33,10 +33,7 @@ pub fn separations(
     let declared = simulated(simulate, &[])?;
     let answered = simulated(simulate, answer)?;
     let first = simulate(answer, 0)?;
-    let layout = Layout {
-        laps: vec![first.iter().map(Vec::len).collect()],
-        lap: answered[0].0[0].scatter.nrows(),
-    };
+    let layout = Layout::of_recording(&first, answered[0].0[0].scatter.nrows());
     let other = Scatter::of_few(declared.iter().map(|summary| &summary.0[0]))?;
     let scatter = [Scatter::near(
         answered.iter().map(|summary| &summary.0[0]),

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::atlas::Atlas;
 use super::expectation::Expectation;
 use super::hypothesis::Hypothesis;
-use super::observed::ObservedLap;
+use super::observed::{ObservedLap, ObservedRun};
 use super::summary::lap_vectors;
 use super::tests_of_fit::Quadratic;
 use super::trial::Trial;
@@ -36,7 +36,7 @@ const SETS: u64 = 32;
 const TIMES: [f64; 7] = [1.0, 1.4, 2.0, 2.8, 4.0, 5.7, 8.0];
 
 /// Runs of laps.
-type Runs = [Vec<ObservedLap>];
+type Runs = [ObservedRun];
 
 impl Trial<'_> {
     /// How the size of one effect of a hypothesis settles within the runs; `None` where the robot crashes.
@@ -48,7 +48,7 @@ impl Trial<'_> {
         let settings = hypothesis.settings(self.atlas);
         let others = hypothesis.without(part).settings(self.atlas);
         self.atlas.spent.add(SETS);
-        let with: Vec<Vec<Vec<ObservedLap>>> = (0..SETS)
+        let with: Vec<Vec<ObservedRun>> = (0..SETS)
             .into_par_iter()
             .map(|set| (self.simulate)(&settings, set))
             .collect::<Option<_>>()?;
@@ -64,8 +64,8 @@ impl Trial<'_> {
         let settling = |laps: &f64| {
             let time_s = laps * self.atlas.lap_s();
             // Run by run: what is more than expected, the square that it has where it is the effect's all, and its variance.
-            let of_run = |(run, laps): (usize, &Vec<ObservedLap>)| {
-                let contrast = contrast(laps, time_s);
+            let of_run = |(run, of): (usize, &ObservedRun)| {
+                let contrast = contrast(&of.laps, time_s);
                 let expected = simulated.iter().map(|sizes| sizes[run].dot(&contrast));
                 let expected = DVector::from_iterator(simulated.len(), expected);
                 let more = measured[run].dot(&contrast) - expected.mean();
@@ -118,7 +118,7 @@ impl Atlas {
     }
 
     /// What an effect does to the mean lap of each run, in units of a lap's scatter.
-    fn directions_of(&self, with: &[Vec<Vec<ObservedLap>>], without: &Expectation) -> Vec<DVector<f64>> {
+    fn directions_of(&self, with: &[Vec<ObservedRun>], without: &Expectation) -> Vec<DVector<f64>> {
         let sets: Vec<Vec<Vec<DVector<f64>>>> = with.iter().map(|data| self.lap_vectors(data)).collect();
         let direction = |(run, (recording, place)): (usize, (usize, usize))| {
             let laps = sets.iter().flat_map(|data| &data[run]);

@@ -5,8 +5,9 @@ use std::ops::Range;
 use nalgebra::{DMatrix, DVector};
 use statrs::statistics::{Data, OrderStatistics};
 
+use super::beginning::BEGINNING;
 use super::layout::ramp_norm;
-use super::observed::ObservedLap;
+use super::observed::{ObservedLap, ObservedRun};
 
 /// Blocks of gates whose durations are part of a lap's vector.
 pub(super) const BLOCKS: usize = 20;
@@ -62,7 +63,7 @@ pub(super) struct Summary(pub(super) Vec<Recording>);
 impl Summary {
     /// The summary of runs of closed laps, `counts` of them in each recording; `None` if a run has fewer than three, or
     /// they have too few gates.
-    pub(super) fn new(runs: &[Vec<ObservedLap>], counts: &[usize]) -> Option<Self> {
+    pub(super) fn new(runs: &[ObservedRun], counts: &[usize]) -> Option<Self> {
         let mut rest = runs;
         let recordings = counts.iter().map(|&count| {
             let (own, others) = rest.split_at_checked(count)?;
@@ -77,7 +78,9 @@ impl Summary {
 #[derive(Debug, Clone)]
 pub(super) struct Recording {
     pub(super) runs: Vec<RunSummary>,
-    /// See [`second_order`].
+    /// See [`second_order`]; behind them the numbers of a run's [`Beginning`], on average, where it is known of any.
+    ///
+    /// [`Beginning`]: super::beginning::Beginning
     pub(super) second: DVector<f64>,
     /// Scatter of the laps about their run's line, and its degrees of freedom.
     pub(super) scatter: DMatrix<f64>,
@@ -85,13 +88,14 @@ pub(super) struct Recording {
 }
 
 impl Recording {
-    fn new(runs: &[Vec<ObservedLap>]) -> Option<Self> {
-        if runs.is_empty() || runs.iter().any(|laps| laps.len() < 3) {
+    fn new(runs: &[ObservedRun]) -> Option<Self> {
+        if runs.is_empty() || runs.iter().any(|run| run.laps.len() < 3) {
             return None;
         }
         let (vectors, noise) = (of_each(runs, lap_vector), of_each(runs, noise_vector));
-        let finite = (vectors.iter().chain(&noise).flatten()).all(|lap| lap.iter().all(|x| x.is_finite()));
-        if !finite {
+        let beginning = mean_beginning(runs);
+        let of_laps = vectors.iter().chain(&noise).flatten();
+        if !(of_laps.chain(&beginning)).all(|numbers| numbers.iter().all(|x| x.is_finite())) {
             return None;
         }
         let near = brought_near(vectors);
@@ -110,6 +114,7 @@ impl Recording {
             summaries.push(summary);
         }
         let second = second_order(&near, &noise);
+        let second = beginning.map_or(second.clone(), |beginning| joined(&second, &beginning));
         Some(Self {
             runs: summaries,
             second,
@@ -120,13 +125,25 @@ impl Recording {
 }
 
 /// The laps of the runs of one recording as vectors, those that went far astray brought nearer.
-pub(super) fn lap_vectors(runs: &[Vec<ObservedLap>]) -> Vec<Vec<DVector<f64>>> {
+pub(super) fn lap_vectors(runs: &[ObservedRun]) -> Vec<Vec<DVector<f64>>> {
     brought_near(of_each(runs, lap_vector))
 }
 
-fn of_each(runs: &[Vec<ObservedLap>], vector: fn(&ObservedLap) -> DVector<f64>) -> Vec<Vec<DVector<f64>>> {
-    let of_run = |laps: &Vec<ObservedLap>| laps.iter().map(vector).collect();
+fn of_each(runs: &[ObservedRun], vector: fn(&ObservedLap) -> DVector<f64>) -> Vec<Vec<DVector<f64>>> {
+    let of_run = |run: &ObservedRun| run.laps.iter().map(vector).collect();
     runs.iter().map(of_run).collect()
+}
+
+/// How runs begin on average, of those of which it is known; `None` if it is known of none.
+fn mean_beginning(runs: &[ObservedRun]) -> Option<DVector<f64>> {
+    let known = || runs.iter().filter_map(|run| run.beginning);
+    let sum = |i: usize| known().map(|beginning| beginning.ahead_mm[i]).sum::<f64>();
+    let count = known().count();
+    (count > 0).then(|| DVector::from_fn(BEGINNING, |i, _| sum(i) / count as f64))
+}
+
+fn joined(a: &DVector<f64>, b: &DVector<f64>) -> DVector<f64> {
+    DVector::from_iterator(a.len() + b.len(), a.iter().chain(b).copied())
 }
 
 /// Laps of which those that went far astray are brought nearer to the middle of their run, as a whole: one of them would decide

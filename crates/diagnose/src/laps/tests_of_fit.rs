@@ -1,8 +1,9 @@
-//! Four numbers that say whether, and in what, a data set departs from what was expected.
+//! Numbers that say whether, and in what, a data set departs from what was expected.
 
 use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
 
 use super::atlas::{NULL_SETS, White};
+use super::beginning::BEGINNING;
 use super::layout::Layout;
 use super::summary::SECOND;
 
@@ -41,6 +42,9 @@ impl Quadratic {
         // Beyond this the tail is 0, and its continued fraction has no value.
         const ENORMOUS: f64 = 1e12;
         let freedom = recordings * each;
+        if freedom == 0 {
+            return Self { q, freedom, p: 1.0 };
+        }
         let (p, total) = (each as f64, freedom as f64);
         let of_one = NULL_SETS as f64 - p;
         // Variance beyond that of chi^2.
@@ -57,9 +61,10 @@ impl Quadratic {
     }
 }
 
-/// Where a data set departs from what was expected: in its mean lap, from run to run, drifting within the runs, or in how its laps scatter.
+/// Where a data set departs from what was expected: in its mean lap, from run to run, drifting within the runs, in how its laps scatter, or
+/// in how its runs begin.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct FourNumbers {
+pub struct Departures {
     /// The mean lap.
     pub mean: Quadratic,
     /// The runs' means among each other.
@@ -68,9 +73,11 @@ pub struct FourNumbers {
     pub trend: Quadratic,
     /// The scatter of the laps.
     pub noise: Quadratic,
+    /// How runs begin; without freedom where that is not known.
+    pub start: Quadratic,
 }
 
-impl FourNumbers {
+impl Departures {
     /// Of a residual in white.
     pub(super) fn new(residual: &White, layout: &Layout) -> Self {
         let squares = |range: std::ops::Range<usize>| residual.rows(range.start, range.len()).norm_squared();
@@ -94,34 +101,38 @@ impl FourNumbers {
             mean: Quadratic::new(means, recordings * layout.lap),
             runs: Quadratic::new(all - means, (layout.runs() - recordings) * layout.lap),
             trend: Quadratic::new(each(&|g| layout.trend(g)), recordings * layout.lap),
-            noise: Quadratic::of_estimated(each(&|g| layout.second(g)), recordings, SECOND),
+            noise: Quadratic::of_estimated(each(&|g| layout.noise(g)), recordings, SECOND),
+            start: Quadratic::of_estimated(
+                each(&|g| layout.beginning(g)),
+                layout.begins.iter().filter(|begins| **begins).count(),
+                BEGINNING,
+            ),
         }
     }
 
-    fn all(&self) -> [Quadratic; 4] {
-        [self.mean, self.runs, self.trend, self.noise]
+    fn all(&self) -> [Quadratic; 5] {
+        [self.mean, self.runs, self.trend, self.noise, self.start]
     }
 
-    /// What exceeds the expectation in all four together.
+    /// What exceeds the expectation in all together.
     pub fn excess(&self) -> f64 {
         self.all().iter().map(Quadratic::excess).sum()
     }
 
-    /// All four together.
+    /// All together.
     fn together(&self) -> Quadratic {
         let q = self.all().iter().map(|number| number.q).sum();
         let freedom = self.all().iter().map(|number| number.freedom).sum();
         Quadratic::new(q, freedom)
     }
 
-    /// The four with their names in files.
-    pub fn named(&self) -> [(&'static str, &Quadratic); 4] {
-        [
-            ("mean", &self.mean),
-            ("runs", &self.runs),
-            ("trend", &self.trend),
-            ("noise", &self.noise),
-        ]
+    /// Those that are known with their names in files.
+    pub fn named(&self) -> Vec<(&'static str, Quadratic)> {
+        let names = ["mean", "runs", "trend", "noise", "start"];
+        let all = names.into_iter().zip(self.all());
+        // Of one run nothing is expected from run to run, and that is known.
+        all.filter(|(name, number)| *name != "start" || number.freedom > 0)
+            .collect()
     }
 
     /// The names of those that depart from what is expected.
@@ -130,22 +141,23 @@ impl FourNumbers {
         departing.map(|(name, _)| name).collect()
     }
 
-    /// Whether chance alone often makes as much of all four together.
+    /// Whether chance alone often makes as much of all together.
     pub(crate) fn excess_is_chance(&self) -> bool {
         const OFTEN_P: f64 = 0.05;
         self.together().p > OFTEN_P
     }
 
-    /// All four together as a multiple of what chance makes of them.
+    /// All together as a multiple of what chance makes of them.
     pub(crate) fn times_chance(&self) -> f64 {
         let Quadratic { q, freedom, .. } = self.together();
         q / freedom as f64
     }
 
-    /// Probability that the smallest of the four is as small as it is: four times that (Bonferroni).
+    /// Probability that the smallest of them is as small as it is: that times their number (Bonferroni).
     pub fn omnibus_p(&self) -> f64 {
-        let least = self.all().iter().map(|number| number.p).fold(1.0, f64::min);
-        (4.0 * least).min(1.0)
+        let all = self.named();
+        let least = all.iter().map(|(_, number)| number.p).fold(1.0, f64::min);
+        (all.len() as f64 * least).min(1.0)
     }
 }
 

@@ -206,7 +206,7 @@ mod tests {
 
     use super::*;
     use crate::Candidate;
-    use crate::laps::tests_of_fit::{FourNumbers, Quadratic};
+    use crate::laps::tests_of_fit::{Departures, Quadratic};
 
     /// An explanation by some names that leaves what has a probability, with its share of the excess and its score.
     fn by(names: &[&str], remainder_p: f64, share: f64, score: f64) -> Explanation {
@@ -265,11 +265,12 @@ mod tests {
     fn names_that_leave_several_times_what_chance_does_are_not_claimed() {
         let leaving = |times: f64, share: f64| {
             let quadratic = |freedom: usize| Quadratic::new(times * freedom as f64, freedom);
-            let remainder = FourNumbers {
+            let remainder = Departures {
                 mean: quadratic(120),
                 runs: quadratic(360),
                 trend: quadratic(120),
                 noise: quadratic(21),
+                start: quadratic(4),
             };
             Explanation {
                 remainder: Some(remainder),

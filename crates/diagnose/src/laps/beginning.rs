@@ -1,0 +1,162 @@
+//! How a run begins.
+
+use std::ops::{Add, Div};
+
+use track::Vec2;
+
+/// Numbers of a run's beginning.
+pub(super) const BEGINNING: usize = 4;
+
+/// Time since a run began to which one of its numbers belongs, s.
+const BIN_S: f64 = 0.064;
+
+/// When a robot drives as fast as it will, s since its run began. Longer, and a robot that knows two commands often turns in it.
+const STEADY_S: (f64, f64) = (BEGINNING as f64 * BIN_S, 1.3);
+
+/// How far a robot is ahead, in the first quarter of a second of its run, of where it would be had it always been as fast as in the second
+/// after that.
+///
+/// Wheels that have to come up to speed and commands that come late leave it behind for good, so that it was ahead at first; sensors that
+/// lag do not. Of laps that go on for ever all three make about the same.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Beginning {
+    /// In four parts of that time, mm along its way.
+    pub(super) ahead_mm: [f64; BEGINNING],
+    /// How fast it is then, m/s.
+    speed_m_s: f64,
+    /// How far it has come when it should be at that speed, m.
+    moved_m: f64,
+}
+
+impl Beginning {
+    /// The beginning of a path of times in s and positions in m, rows in time order, the first of which is the run's start; `None`
+    /// where too few of its rows are there.
+    pub fn of(path: &[(f64, Vec2)]) -> Option<Self> {
+        const FEWEST_STEADY: usize = 12;
+        /// Part of the time at a steady speed by the end of which every robot moves, s.
+        const MOVES_S: f64 = 0.5;
+        let start_s = path.first()?.0;
+        let since = |row: &(f64, Vec2)| row.0 - start_s + 1e-6;
+        let rows: Vec<(f64, Vec2)> = (path.iter())
+            .map(|row| (since(row), row.1))
+            .take_while(|row| row.0 < STEADY_S.1)
+            .collect();
+        let (early, steady): (Vec<_>, Vec<_>) = rows.into_iter().partition(|row| row.0 < STEADY_S.0);
+        if steady.len() < FEWEST_STEADY {
+            return None;
+        }
+        let (first, second) = steady.split_at(steady.len() / 2);
+        let along =
+            (mean(second.iter().map(|row| row.1))? - mean(first.iter().map(|row| row.1))?).normalize();
+        let origin = early.first()?.1;
+        let way_m = |row: &(f64, Vec2)| (row.1 - origin).dot(along);
+        let (middle_s, middle_m) = (
+            mean(steady.iter().map(|row| row.0))?,
+            mean(steady.iter().map(way_m))?,
+        );
+        let off_s = |row: &(f64, Vec2)| row.0 - middle_s;
+        let speed_m_s = steady.iter().map(|row| off_s(row) * way_m(row)).sum::<f64>()
+            / steady.iter().map(|row| off_s(row).powi(2)).sum::<f64>();
+        let ahead_m = |row: &(f64, Vec2)| way_m(row) - middle_m - speed_m_s * off_s(row);
+        let mut ahead_mm = [0.0; BEGINNING];
+        for (bin, ahead_mm) in ahead_mm.iter_mut().enumerate() {
+            let in_bin = early.iter().filter(|row| (row.0 / BIN_S) as usize == bin);
+            *ahead_mm = 1000.0 * mean(in_bin.map(ahead_m))?;
+        }
+        let later = steady.iter().filter(|row| row.0 < MOVES_S);
+        Some(Self {
+            ahead_mm,
+            speed_m_s,
+            moved_m: mean(later.map(way_m))? - mean(early.iter().take(2).map(way_m))?,
+        })
+    }
+
+    /// Whether a robot whose program's speed is `speed_m_s` starts and drives on in it: files that begin before or after their run do
+    /// not tell how it began, and a robot that turns at once stands on one place.
+    pub fn is_a_start(&self, speed_m_s: f64) -> bool {
+        /// Share of its speed that a robot has that drives on.
+        const DRIVES: f64 = 0.5;
+        self.speed_m_s > DRIVES * speed_m_s && !self.stands(speed_m_s)
+    }
+
+    /// Whether the robot still stands where it began when it should be at its program's speed.
+    pub fn stands(&self, speed_m_s: f64) -> bool {
+        /// Time in which it moves no farther, s.
+        const NO_TIME_S: f64 = 0.05;
+        self.moved_m < NO_TIME_S * speed_m_s
+    }
+}
+
+/// The mean of some values; `None` of none.
+fn mean<T: Add<Output = T> + Div<f64, Output = T>>(values: impl Iterator<Item = T>) -> Option<T> {
+    let (sum, count) = (values.map(|value| (value, 1.0))).reduce(|a, b| (a.0 + b.0, a.1 + b.1))?;
+    Some(sum / count)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SPEED_M_S: f64 = 0.05;
+
+    /// A straight way with a distance gone after each time.
+    fn path(start_s: f64, gone_m: impl Fn(f64) -> f64) -> Vec<(f64, Vec2)> {
+        let (origin, along) = (Vec2::new(0.3, 0.9), Vec2::new(0.6, -0.8));
+        (0..40)
+            .map(|step| 0.064 * f64::from(step))
+            .map(|time_s| (start_s + time_s, origin + along * gone_m(time_s)))
+            .collect()
+    }
+
+    #[test]
+    fn a_robot_that_starts_at_once_is_never_ahead() {
+        for start_s in [0.0, 51_234.5] {
+            let found = Beginning::of(&path(start_s, |time_s| SPEED_M_S * time_s)).unwrap();
+            assert!(found.ahead_mm.iter().all(|mm| mm.abs() < 1e-6), "{found:?}");
+            assert!(found.is_a_start(SPEED_M_S) && (found.speed_m_s - SPEED_M_S).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn commands_that_come_late_and_wheels_that_come_up_to_speed_leave_it_behind() {
+        // Late by 0.1 s: 5 mm, of which 3.2 mm and then all are made up for by not moving.
+        let late = path(0.0, |time_s| SPEED_M_S * (time_s - 0.1).max(0.0));
+        let late = Beginning::of(&late).unwrap();
+        for (found, truth) in late.ahead_mm.into_iter().zip([5.0, 1.8, 0.0, 0.0]) {
+            assert!((found - truth).abs() < 1e-6, "{late:?}");
+        }
+        // A lag of 0.02 s is over when it is looked at again.
+        let lag = path(0.0, |time_s| {
+            SPEED_M_S * (time_s - 0.02 * (1.0 - (-time_s / 0.02).exp()))
+        });
+        let lag = Beginning::of(&lag).unwrap();
+        assert!(
+            (lag.ahead_mm[0] - 1.0).abs() < 1e-4 && lag.ahead_mm[3].abs() < 1e-3,
+            "{lag:?}"
+        );
+        assert!(late.is_a_start(SPEED_M_S) && lag.is_a_start(SPEED_M_S));
+    }
+
+    #[test]
+    fn files_that_begin_before_their_run_and_robots_that_turn_at_once_do_not_start() {
+        let stands = Beginning::of(&path(0.0, |time_s| SPEED_M_S * (time_s - 0.6).max(0.0))).unwrap();
+        assert!(stands.stands(SPEED_M_S) && !stands.is_a_start(SPEED_M_S));
+        let turns = Beginning::of(&path(0.0, |time_s| SPEED_M_S * time_s.min(0.5))).unwrap();
+        assert!(!turns.stands(SPEED_M_S) && !turns.is_a_start(SPEED_M_S));
+    }
+
+    #[test]
+    fn rows_that_are_missing_are_not_made_up() {
+        let whole = path(0.0, |time_s| SPEED_M_S * time_s);
+        for missing in [1..2, 3..4, 5..11, 0..40] {
+            let mut rows = whole.clone();
+            rows.drain(missing.clone());
+            let found = Beginning::of(&rows);
+            assert!(found.is_none(), "{missing:?}: {found:?}");
+        }
+        // One of the later rows more or less is no matter.
+        let mut rows = whole;
+        rows.remove(9);
+        assert!(Beginning::of(&rows).is_some());
+    }
+}
