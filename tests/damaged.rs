@@ -76,6 +76,47 @@ fn a_robot_that_was_not_always_seen_is_no_other_robot() {
 }
 
 #[test]
+fn how_a_run_starts_is_not_compared_where_its_file_begins_before_it() {
+    const ROWS: usize = 20;
+    let scratch = Scratch::new();
+    as_declared().logged(&[4; 3]).record(&scratch, "set");
+    for run in ["a", "b", "c"] {
+        let file = format!("set/run_{run}.csv");
+        let text = scratch.read(&file);
+        let (header, rows) = text.split_once('\n').unwrap();
+        let time_and_rest = |row: &str| {
+            let (time, rest) = row.split_once(',').unwrap();
+            (time.parse::<f64>().unwrap(), rest.to_owned())
+        };
+        let (_, first) = time_and_rest(rows);
+        let seen: Vec<f64> = first
+            .split(',')
+            .take(2)
+            .map(|field| field.parse().unwrap())
+            .collect();
+        let mut waiting = format!("{header}\n");
+        for row in 0..ROWS {
+            let noise_m = 1e-3 * ((row * 7919) % 5) as f64 - 2e-3;
+            let position = format!("{:.4},{:.4}", seen[0] + noise_m, seen[1] - noise_m);
+            waiting += &format!("{:.3},{position}{}\n", 0.064 * row as f64, ",".repeat(10));
+        }
+        for row in rows.lines() {
+            let (time_s, rest) = time_and_rest(row);
+            waiting += &format!("{:.3},{rest}\n", time_s + 0.064 * ROWS as f64);
+        }
+        scratch.write(&file, waiting);
+    }
+    let found = trace(&scratch, "braitenberg", "set", &[]);
+    says(&found, "faithful", &[]);
+    let said = "Runs set/a, set/b, set/c: the robot still stands where the file begins";
+    assert!(
+        remarks(&found).iter().any(|remark| remark.starts_with(said)),
+        "{found:#}"
+    );
+    assert!(found["residual"]["numbers"]["start"].is_null(), "{found:#}");
+}
+
+#[test]
 fn laps_in_which_the_robot_was_out_of_sight_are_set_aside() {
     let scratch = Scratch::new();
     as_declared().logged(&[6; 3]).record(&scratch, "set");

@@ -175,6 +175,31 @@ impl Effect for Tilted {
     }
 }
 
+/// Motors that come up to speed slowly, and are as fast as any once they are.
+static WEAK: Spec = Spec {
+    name: "weak",
+    stage: Stage::Act,
+    summary: "a wheel's speed grows and falls by so much a second at most",
+    params: &[Param::new("m_s2", "m/s^2", 10.0, 0.0, 10.0)],
+    list: None,
+    build: || Box::<Weak>::default(),
+};
+
+#[derive(Debug, Default)]
+struct Weak(WheelSpeeds);
+
+impl Effect for Weak {
+    fn drive(&mut self, values: &[f64], now: &Moment, wheels: WheelSpeeds) -> WheelSpeeds {
+        let most = values[0] * now.step_s;
+        let towards = |target: f64, before: f64| before + (target - before).clamp(-most, most);
+        self.0 = WheelSpeeds {
+            left_m_s: towards(wheels.left_m_s, self.0.left_m_s),
+            right_m_s: towards(wheels.right_m_s, self.0.right_m_s),
+        };
+        self.0
+    }
+}
+
 /// What a trace says of sensors that warm up, and of a wheel out of round.
 const SETTLING: [&str; 4] = ["sense", "reading", "time", "settling"];
 const OUT_OF_ROUND: [&str; 4] = ["act", "right wheel", "wheel angle", "harmonics"];
@@ -192,6 +217,38 @@ fn a_listed_effect_under_another_name_is_named_from_laps() {
     let found = trace(&scratch, "braitenberg", "set", &[]);
     says(&found, "explained", &["wheel-asymmetry"]);
     holds(&found["effects"][0], "ratio", LIMPING, 1.0);
+}
+
+/// Once it drives it never needs more; its laps are those of the declared robot.
+#[test]
+fn motors_too_weak_to_start_at_once_are_known_by_how_runs_begin() {
+    const M_S2: f64 = 0.2;
+    share_signatures("braitenberg");
+    let scratch = Scratch::new();
+    Robot::with(Setting::constant(&WEAK, [M_S2])).record(&scratch, "set");
+    let found = trace(&scratch, "braitenberg", "set", &[]);
+    says(&found, "explained", &["acceleration-limit"]);
+    holds(&found["effects"][0], "m_s2", M_S2, 0.0);
+    assert_eq!(
+        found["residual"]["where"],
+        serde_json::json!(["start"]),
+        "{found:#}"
+    );
+}
+
+/// Laps that go on for ever hardly tell this from wheels that lag: these do not start at once.
+#[test]
+fn sensors_that_lag_are_no_lag_of_the_wheels() {
+    share_signatures("braitenberg");
+    let scratch = Scratch::new();
+    Robot::with(Setting::constant(sim::find("sensor-lag").unwrap(), [0.13])).record(&scratch, "set");
+    let found = trace(&scratch, "braitenberg", "set", &[]);
+    says(&found, "explained", &["sensor-lag"]);
+    assert_eq!(
+        found["effects"][0]["alternatives"],
+        serde_json::json!([]),
+        "{found:#}"
+    );
 }
 
 #[test]

@@ -41,6 +41,8 @@ pub(crate) struct DataSet {
     pub(crate) laps: usize,
     /// What was measured and how.
     pub(crate) note: String,
+    /// Whether the first row of each file is its run's start, from rest.
+    pub(crate) from_start: bool,
     /// Keys of the model that were set otherwise, nested; known and of the right type.
     pub(crate) declared: Table,
     /// In the order of `dataset.toml`, at least one.

@@ -68,7 +68,7 @@ impl Explanation {
     }
 
     /// Share of what exceeds the declared model's expectation that it explains, in [0, 1]; `None` where laps alone tell it and that
-    /// much of their four numbers is often chance, of which nothing is a share.
+    /// much of how they depart is often chance, of which nothing is a share.
     pub fn explained(&self, of_laps: Option<&Departures>) -> Option<f64> {
         let is_chance = of_laps.is_some_and(Departures::excess_is_chance);
         (!is_chance).then(|| self.share.clamp(0.0, 1.0))

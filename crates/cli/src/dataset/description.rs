@@ -11,7 +11,7 @@ use crate::output::Input;
 use crate::setup;
 
 /// Of a data set of laps.
-const KEYS: [&str; 8] = [
+const KEYS: [&str; 9] = [
     "name",
     "kind",
     "world",
@@ -19,6 +19,7 @@ const KEYS: [&str; 8] = [
     "runs",
     "laps",
     "note",
+    "from_start",
     "declared",
 ];
 
@@ -53,6 +54,7 @@ pub(super) fn load(source: Source<'_>) -> Result<(DataSet, Vec<(String, PathBuf)
         controller: Some(description.controller()?),
         laps: description.laps()?,
         note: description.text("note")?.unwrap_or_default(),
+        from_start: description.starts()?,
         declared: description.declared()?,
         runs: Vec::new(),
         inputs: vec![input],
@@ -72,6 +74,7 @@ pub(super) fn nameless(folder: &Path) -> DataSet {
         controller: None,
         laps: LAPS,
         note: String::new(),
+        from_start: true,
         declared: Table::new(),
         runs: Vec::new(),
         inputs: Vec::new(),
@@ -140,6 +143,13 @@ impl Description {
         count
             .and_then(|laps| usize::try_from(laps).ok())
             .ok_or_else(|| self.error("laps", format!("{laps} is not a whole number from 1")))
+    }
+
+    fn starts(&self) -> Result<bool> {
+        self.get("from_start").map_or(Ok(true), |value| {
+            let needed = || self.error("from_start", format!("{value} is neither true nor false"));
+            value.as_bool().ok_or_else(needed)
+        })
     }
 
     /// The keys of the model that the data set sets, checked as in a model's file.

@@ -204,6 +204,11 @@ fn faults_of_the_description_name_line_and_key() {
         ),
         (
             "laps = 3",
+            "from_start = \"no\"",
+            "dataset.toml:5: `from_start`: \"no\" is neither true nor false",
+        ),
+        (
+            "laps = 3",
             "kind = \"drive-log\"",
             "dataset.toml:5: `kind`: drive logs cannot be read here yet",
         ),

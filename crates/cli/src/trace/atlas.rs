@@ -89,8 +89,8 @@ fn atlas_of(
     if !alike {
         key += &format!("\n{:?}", recording.places(&[]));
     }
-    if recording.begins.contains(&false) {
-        key += &format!("\nbegin {:?}", recording.begins);
+    if let Some(begin) = recording.beginnings.unknown() {
+        key += &format!("\n{begin}");
     }
     if physics_step_s != recording.setup.model.run.physics_step_s() {
         key += &format!("\ndelays in {physics_step_s} s");

@@ -23,6 +23,7 @@ use diagnose::{Answer, Baselines, Decided, Departures, Detectable};
 
 use answer::{FromLogs, TracedLaps};
 use atlas::{Purpose, laps_simulated};
+use beginnings::only_beginnings_depart;
 pub(crate) use cache::Cache;
 pub(crate) use document::{document, parameters};
 pub(crate) use errors::Errors;
@@ -122,6 +123,7 @@ impl Trace {
         progress.message("simulating the error before and after");
         let errors = errors(&recordings, &named.answer, held_out, seed)?;
         interrupt::check()?;
+        remarks.extend(only_beginnings_depart(&named.residual));
         if let (Some(found), Some(logs)) = (&named.from_logs, &logged) {
             remarks.extend(unused_in_words(&recordings, logs, &found.logs));
             if matches!(found.logs.decide, Decided::NoController { .. }) {

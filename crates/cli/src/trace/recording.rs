@@ -7,7 +7,7 @@ use diagnose::{ObservedRun, Unseen, coarse_unit_m};
 use sim::{Setting, Start, Step, Streams, Vec2, World};
 use track::Lap;
 
-use super::beginnings::begins;
+use super::beginnings::Beginnings;
 use super::checks::{belongs, is_timed};
 use crate::config::{Config, ModelFile};
 use crate::dataset::{DataSet, RunFile};
@@ -26,8 +26,8 @@ pub(crate) struct Recording {
     pub(super) cuts: Vec<Setup>,
     /// Where in its laps the camera did not see the robot, run by run.
     pub(super) unseen: Vec<Unseen>,
-    /// Whether it is known how each run begins.
-    pub(super) begins: Vec<bool>,
+    /// How its runs begin, as far as that is known.
+    pub(super) beginnings: Beginnings,
     /// What its positions are multiples of, m, if that is coarse: to the model that is noise of the camera.
     pub(super) written_m: Option<f64>,
     /// Text of the world file.
@@ -158,10 +158,9 @@ impl Recording {
                 model: setup.model.clone(),
             })
             .collect();
-        let begins = begins(session, &measured, &setup);
         Ok(Self {
             unseen: unseen(&measured, setup.model.run.control_step_s),
-            begins,
+            beginnings: Beginnings::of(&measured, &setup),
             written_m,
             config,
             setup,
@@ -243,7 +242,7 @@ impl Recording {
                 number: self.first_run + i,
                 start: changes.then(|| run.start()),
                 unseen: Some(unseen).filter(|unseen| !unseen.is_nothing()),
-                begins: self.begins[i],
+                begins: self.beginnings.is_known(i),
             })
             .collect()
     }

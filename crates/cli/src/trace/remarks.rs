@@ -25,6 +25,7 @@ pub(super) fn remarks(recordings: &[Recording], logged: Option<&Logs>) -> Vec<St
             ));
         }
         remarks.extend(recording.clocks_in_words());
+        remarks.extend(recording.beginnings.in_words());
         let gates = recording.measured.circuit.gates.len();
         for (run, unseen) in recording.measured.runs.iter().zip(&recording.unseen) {
             remarks.extend(run.strays.iter().cloned().chain(run.laps_set_aside()));

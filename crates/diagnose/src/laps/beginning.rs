@@ -7,11 +7,11 @@ use track::Vec2;
 /// Numbers of a run's beginning.
 pub(super) const BEGINNING: usize = 4;
 
-/// Time since a run began to which one of its numbers belongs, s.
+/// Time from one of these numbers to the next, s.
 const BIN_S: f64 = 0.064;
 
 /// When a robot drives as fast as it will, s since its run began. Longer, and a robot that knows two commands often turns in it.
-const STEADY_S: (f64, f64) = (BEGINNING as f64 * BIN_S, 1.3);
+const STEADY_S: (f64, f64) = ((BEGINNING as f64 - 0.5) * BIN_S, 1.3);
 
 /// How far a robot is ahead, in the first quarter of a second of its run, of where it would be had it always been as fast as in the second
 /// after that.
@@ -20,11 +20,9 @@ const STEADY_S: (f64, f64) = (BEGINNING as f64 * BIN_S, 1.3);
 /// lag do not. Of laps that go on for ever all three make about the same.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Beginning {
-    /// In four parts of that time, mm along its way.
+    /// At four times a control step apart, mm along its way.
     pub(super) ahead_mm: [f64; BEGINNING],
-    /// How fast it is then, m/s.
-    speed_m_s: f64,
-    /// How far it has come when it should be at that speed, m.
+    /// How far it has come when it should be as fast as it will, m.
     moved_m: f64,
 }
 
@@ -36,9 +34,8 @@ impl Beginning {
         /// Part of the time at a steady speed by the end of which every robot moves, s.
         const MOVES_S: f64 = 0.5;
         let start_s = path.first()?.0;
-        let since = |row: &(f64, Vec2)| row.0 - start_s + 1e-6;
         let rows: Vec<(f64, Vec2)> = (path.iter())
-            .map(|row| (since(row), row.1))
+            .map(|row| (row.0 - start_s, row.1))
             .take_while(|row| row.0 < STEADY_S.1)
             .collect();
         let (early, steady): (Vec<_>, Vec<_>) = rows.into_iter().partition(|row| row.0 < STEADY_S.0);
@@ -60,29 +57,21 @@ impl Beginning {
         let ahead_m = |row: &(f64, Vec2)| way_m(row) - middle_m - speed_m_s * off_s(row);
         let mut ahead_mm = [0.0; BEGINNING];
         for (bin, ahead_mm) in ahead_mm.iter_mut().enumerate() {
-            let in_bin = early.iter().filter(|row| (row.0 / BIN_S) as usize == bin);
+            let in_bin = early.iter().filter(|row| (row.0 / BIN_S).round() as usize == bin);
             *ahead_mm = 1000.0 * mean(in_bin.map(ahead_m))?;
         }
         let later = steady.iter().filter(|row| row.0 < MOVES_S);
         Some(Self {
             ahead_mm,
-            speed_m_s,
             moved_m: mean(later.map(way_m))? - mean(early.iter().take(2).map(way_m))?,
         })
     }
 
-    /// Whether a robot whose program's speed is `speed_m_s` starts and drives on in it: files that begin before or after their run do
-    /// not tell how it began, and a robot that turns at once stands on one place.
-    pub fn is_a_start(&self, speed_m_s: f64) -> bool {
-        /// Share of its speed that a robot has that drives on.
-        const DRIVES: f64 = 0.5;
-        self.speed_m_s > DRIVES * speed_m_s && !self.stands(speed_m_s)
-    }
-
-    /// Whether the robot still stands where it began when it should be at its program's speed.
+    /// Whether the robot still stands where it began when it should be at its program's speed, as it does in a file that begins before
+    /// its run.
     pub fn stands(&self, speed_m_s: f64) -> bool {
         /// Time in which it moves no farther, s.
-        const NO_TIME_S: f64 = 0.05;
+        const NO_TIME_S: f64 = 0.04;
         self.moved_m < NO_TIME_S * speed_m_s
     }
 }
@@ -113,7 +102,7 @@ mod tests {
         for start_s in [0.0, 51_234.5] {
             let found = Beginning::of(&path(start_s, |time_s| SPEED_M_S * time_s)).unwrap();
             assert!(found.ahead_mm.iter().all(|mm| mm.abs() < 1e-6), "{found:?}");
-            assert!(found.is_a_start(SPEED_M_S) && (found.speed_m_s - SPEED_M_S).abs() < 1e-9);
+            assert!(!found.stands(SPEED_M_S), "{found:?}");
         }
     }
 
@@ -134,15 +123,16 @@ mod tests {
             (lag.ahead_mm[0] - 1.0).abs() < 1e-4 && lag.ahead_mm[3].abs() < 1e-3,
             "{lag:?}"
         );
-        assert!(late.is_a_start(SPEED_M_S) && lag.is_a_start(SPEED_M_S));
+        assert!(!late.stands(SPEED_M_S) && !lag.stands(SPEED_M_S));
     }
 
     #[test]
-    fn files_that_begin_before_their_run_and_robots_that_turn_at_once_do_not_start() {
-        let stands = Beginning::of(&path(0.0, |time_s| SPEED_M_S * (time_s - 0.6).max(0.0))).unwrap();
-        assert!(stands.stands(SPEED_M_S) && !stands.is_a_start(SPEED_M_S));
-        let turns = Beginning::of(&path(0.0, |time_s| SPEED_M_S * time_s.min(0.5))).unwrap();
-        assert!(!turns.stands(SPEED_M_S) && !turns.is_a_start(SPEED_M_S));
+    fn in_files_that_begin_before_their_run_the_robot_stands() {
+        for waits_s in [0.6, 1.1] {
+            let gone_m = |time_s: f64| SPEED_M_S * (time_s - waits_s).max(0.0);
+            let found = Beginning::of(&path(0.0, gone_m)).unwrap();
+            assert!(found.stands(SPEED_M_S), "{waits_s}: {found:?}");
+        }
     }
 
     #[test]
