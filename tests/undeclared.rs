@@ -8,7 +8,7 @@ use sim::{
 use crate::ground;
 use crate::support::Scratch;
 use crate::tracing::{
-    GAINS, LAPS, RUNS, Robot, holds, names, never_a_listed_name, says, share_signatures, trace, without_name,
+    GAINS, Robot, holds, names, never_a_listed_name, says, share_signatures, trace, without_name,
 };
 
 /// A listed effect, written anew under another name.
@@ -324,17 +324,15 @@ fn a_light_that_goes_over_the_runs_is_seen_beside_wheels_that_slip_much() {
     const SLIP: f64 = 4.2;
     const COUNTS: [f64; 4] = [43.7, 17.3, 11.4, 6.9];
     const AZIMUTH_RAD: f64 = 2.126;
+    share_signatures("braitenberg");
     let scratch = Scratch::new();
     let mut robot = Robot::with(Setting::constant(sim::find("slip-level").unwrap(), [SLIP]));
-    robot.controller = ground::rule_based();
-    // Runs of five laps are too short: two of seven such data sets have just the two names.
-    robot.laps = vec![2 * LAPS; RUNS];
     robot.effects.push(Setting {
         spec: sim::find("directional-light").unwrap(),
         pattern: Pattern::ByRun(COUNTS.map(|counts| vec![counts, AZIMUTH_RAD]).to_vec()),
     });
     robot.record(&scratch, "set");
-    let found = trace(&scratch, "rule-based", "set", &[]);
+    let found = trace(&scratch, "braitenberg", "set", &[]);
     assert_eq!(found["verdict"], "explained", "{found:#}");
     let effects = found["effects"].as_array().unwrap();
     let of = |name: &str| effects.iter().find(|effect| effect["name"] == name);
