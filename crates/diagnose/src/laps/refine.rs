@@ -438,6 +438,8 @@ impl Atlas {
 
     /// What a hypothesis pays for its fitted numbers, for the choice of its probes, and for what robots hardly do.
     fn price_of(&self, hypothesis: &Hypothesis) -> f64 {
+        /// A program's constants can be read in it: one in three that they are not what was declared rather than what does the same.
+        const KNOWN_CONSTANT: f64 = 1.1;
         /// A program's constants stay what they are, and so does an axle: one in twenty that it is not another cause that changes.
         const CHANGING_CONSTANT: f64 = 3.0;
         /// What slips more in one moment does not slip less in the next: laps tell that from less slip as little as memory from more.
@@ -447,7 +449,9 @@ impl Atlas {
             let swings = spec.name == "slip-memory" && part.mean_size(self) < 0.0;
             let changes =
                 part.shape != Shape::Constant && (spec.name == "axle-length" || spec.stage == Stage::Decide);
+            let is_known = spec.stage == Stage::Decide;
             self.choice(part.probe)
+                + if is_known { KNOWN_CONSTANT } else { 0.0 }
                 + if changes { CHANGING_CONSTANT } else { 0.0 }
                 + if swings { SWINGING_SLIP } else { 0.0 }
         };
