@@ -9,9 +9,11 @@ use serde::{Deserialize, Serialize};
 use sim::Setting;
 
 use super::expectation::{Expectation, Scatter};
+use super::hypothesis::Hypothesis;
 use super::layout::Layout;
 use super::observed::ObservedRun;
 use super::probe::{Probe, probes};
+use super::ripple::{Power, Ripples, power, wheel_sets};
 use super::summary::{BLOCKS, Summary};
 use crate::Error;
 
@@ -48,6 +50,8 @@ pub struct Atlas {
     pub(super) probes: Vec<Probe>,
     /// For each probe, for each of its sizes, the expectation in white; `None` where the robot crashes.
     pub(super) paths: Vec<Vec<Option<White>>>,
+    /// How laps of the declared model ripple.
+    pub(super) ripples: Ripples,
     pub(super) spent: Spent,
 }
 
@@ -112,16 +116,20 @@ impl Atlas {
         probes: Vec<Probe>,
         tick: &(dyn Fn() + Sync),
     ) -> Result<Self, Error> {
-        let null: Vec<Summary> = (0..NULL_SETS)
-            .into_par_iter()
-            .map(|set| {
-                tick();
-                let runs = simulate(&[], set).ok_or(Error::DeclaredModelStops)?;
-                Summary::new(&runs, &[runs.len()]).ok_or(Error::TooFewLaps)
-            })
-            .collect::<Vec<_>>()
+        let ticking = |effects: &[Setting], set: u64| {
+            tick();
+            simulate(effects, set)
+        };
+        let declared = |set: u64| -> Result<(Summary, Power), Error> {
+            let runs = ticking(&[], set).ok_or(Error::DeclaredModelStops)?;
+            let summary = Summary::new(&runs, &[runs.len()]).ok_or(Error::TooFewLaps)?;
+            Ok((summary, power(&runs)))
+        };
+        let declared: Vec<_> = (0..NULL_SETS).into_par_iter().map(declared).collect();
+        let (null, round): (Vec<Summary>, Vec<Power>) = (declared.into_iter())
+            .collect::<Result<Vec<_>, _>>()?
             .into_iter()
-            .collect::<Result<_, _>>()?;
+            .unzip();
         let expectation = Expectation::of(null.iter(), alike);
         let first = simulate(&[], 0).ok_or(Error::DeclaredModelStops)?;
         let layout = Layout::of_recording(&first, expectation.0[0].trend.len());
@@ -138,16 +146,18 @@ impl Atlas {
             scatter: vec![scatter],
             probes,
             paths: Vec::new(),
+            ripples: Ripples::default(),
             spent: Spent::default(),
         };
         drop(null);
-        atlas.paths = atlas.simulate_paths(simulate, tick);
+        atlas.paths = atlas.simulate_paths(&ticking);
+        atlas.ripples = atlas.ripples(&ticking, &Hypothesis::nothing(), round);
         atlas.spent = Spent::default();
         Ok(atlas)
     }
 
     /// The action of every probe at every size.
-    fn simulate_paths(&self, simulate: &Simulate<'_>, tick: &(dyn Fn() + Sync)) -> Vec<Vec<Option<White>>> {
+    fn simulate_paths(&self, simulate: &Simulate<'_>) -> Vec<Vec<Option<White>>> {
         let jobs: Vec<(usize, usize)> = (self.probes.iter().enumerate())
             .flat_map(|(p, probe)| (0..probe.sizes.len()).map(move |k| (p, k)))
             .collect();
@@ -156,11 +166,7 @@ impl Atlas {
             .map(|&(p, k)| {
                 let probe = &self.probes[p];
                 let setting = [probe.setting(probe.sizes[k])];
-                let ticking = |effects: &[Setting], set: u64| {
-                    tick();
-                    simulate(effects, set)
-                };
-                let found = self.simulated(&ticking, &setting, PATH_SETS)?;
+                let found = self.simulated(simulate, &setting, PATH_SETS)?;
                 Some(self.white(&found.expectation, &self.null))
             })
             .collect();
@@ -185,6 +191,7 @@ impl Atlas {
             samples,
             layout: Layout::join(parts.iter().map(|part| &part.layout))?,
             paths: paths.collect(),
+            ripples: Ripples::join(&parts.iter().map(|part| &part.ripples).collect::<Vec<_>>()),
             probes,
             spent: Spent::default(),
         })
@@ -200,6 +207,7 @@ impl Atlas {
             samples: self.samples.clone(),
             layout: self.layout.clone(),
             paths: self.paths.clone(),
+            ripples: self.ripples.clone(),
         })
         .expect("numbers and lists have a form as bytes")
     }
@@ -214,6 +222,7 @@ impl Atlas {
             samples,
             layout,
             paths,
+            ripples,
         } = postcard::from_bytes(bytes).ok()?;
         let probes = if made_with.is_empty() {
             Vec::new()
@@ -228,6 +237,7 @@ impl Atlas {
             layout,
             probes,
             paths,
+            ripples,
             spent: Spent::default(),
         })
     }
@@ -236,7 +246,8 @@ impl Atlas {
     pub fn sets(cuts: usize) -> u64 {
         let sets = |probe: &Probe| PATH_SETS * probe.sizes.len() as u64;
         // As many whatever the step.
-        Self::null_sets(cuts) + probes(1.0).iter().map(sets).sum::<u64>()
+        let probes = probes(1.0);
+        Self::null_sets(cuts) + probes.iter().map(sets).sum::<u64>() + wheel_sets(&probes)
     }
 
     /// Number of data sets that [`Atlas::without_effects`] simulates with so many other cuts.
@@ -343,6 +354,7 @@ struct Stored {
     samples: Vec<Expectation>,
     layout: Layout,
     paths: Vec<Vec<Option<White>>>,
+    ripples: Ripples,
 }
 
 /// What tells two lists of probes apart.

@@ -14,8 +14,9 @@ use super::search::{Found, Search, candidates, of_other_effects, sort};
 use super::tests_of_fit::{ALARM_P, Departures};
 use super::trial::Trial;
 use super::verdict::{
-    ALL_BUT_FAULTS, ENOUGH, MOST, goes_over_runs_or_time, is_claimed, is_doubtful, leaves_nothing_to_ask,
-    preferred, stands_alone, suffices, unless_as_good, unless_named, verdict_of, with_first,
+    ALL_BUT_FAULTS, ENOUGH, MOST, goes_over_runs_or_time, hides_what_is_left, is_claimed, is_doubtful,
+    leaves_nothing_to_ask, preferred, stands_alone, suffices, unless_as_good, unless_named, verdict_of,
+    with_first,
 };
 use crate::answer::{ALTERNATIVE, indistinguishable};
 use crate::{Answer, Cause, Error, Explanation, Verdict, Watch};
@@ -163,7 +164,8 @@ fn explain(search: &Search<'_>, mut found: Vec<Found>) -> Vec<Found> {
     let jumps = found.first().is_some_and(|best| search.jumped(best));
     let needs_no_scan = |best: &Explanation| {
         // What explains most and leaves something lacks a second effect rather than another name.
-        let lacks_another = best.share > MOST && !jumps && !goes_over_runs_or_time(best);
+        let lacks_another =
+            best.share > MOST && !jumps && !goes_over_runs_or_time(best) && !hides_what_is_left(best);
         suffices(best) && !is_doubtful(best, ENOUGH) || lacks_another && !best.fits()
     };
     if !first_is(&found, needs_no_scan) {
@@ -193,7 +195,9 @@ fn explain(search: &Search<'_>, mut found: Vec<Found>) -> Vec<Found> {
     }
     found.extend(search.patterns(worth_a_pattern(&found)));
     sort(&mut found);
-    let leaves_next_to_nothing = |best: &Explanation| best.share >= ENOUGH && !goes_over_runs_or_time(best);
+    let leaves_next_to_nothing = |best: &Explanation| {
+        best.share >= ENOUGH && !goes_over_runs_or_time(best) && !hides_what_is_left(best)
+    };
     let pairs = match found.first() {
         Some(best) if stands_alone(&best.explanation) || leaves_next_to_nothing(&best.explanation) => {
             search.pairs_with_first(&mut found)

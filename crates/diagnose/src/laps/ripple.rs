@@ -7,17 +7,20 @@ use std::f64::consts::TAU;
 
 use nalgebra::DVector;
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use sim::Setting;
 use statrs::statistics::{Data, OrderStatistics};
 
-use super::atlas::Atlas;
+use super::atlas::{Atlas, Simulate};
 use super::hypothesis::Hypothesis;
 use super::observed::ObservedRun;
 use super::part::Part;
+use super::probe::Probe;
 use super::summary::{BLOCKS, deviations, lap_vector};
 use super::tests_of_fit::Quadratic;
 use super::trial::Trial;
 
-/// Data sets simulated of what is expected.
+/// Data sets simulated of what is expected where effects are known.
 const SETS: u64 = 24;
 
 /// Data sets simulated with each wheel out of round beside it, and the share by which it then is.
@@ -65,17 +68,86 @@ impl Ripple {
     }
 }
 
+/// A wheel out of round by a share of its speed.
 fn wheel(atlas: &Atlas, probe: usize, share: f64) -> Hypothesis {
     let of_wheel = &atlas.probes[probe];
     Hypothesis::of(Part::group(of_wheel, probe, &[share / of_wheel.free[0].1]))
 }
 
+/// The probes that turn with a wheel.
+fn wheels(probes: &[Probe]) -> impl Iterator<Item = usize> {
+    (0..probes.len()).filter(|&probe| probes[probe].turns())
+}
+
+/// Number of data sets that are simulated with wheels out of round.
+pub(super) fn wheel_sets(probes: &[Probe]) -> u64 {
+    WHEEL_SETS * wheels(probes).count() as u64
+}
+
+/// Power of how the laps of a data set deviate sideways from the means of their run's quarters, mm^2, from [`LEAST_CYCLES`] cycles per lap
+/// to one in two gates.
+pub(super) type Power = DVector<f64>;
+
+/// How laps ripple as they are expected to, data set by data set, and as they do with each wheel out of round.
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+pub(super) struct Ripples {
+    round: Vec<Power>,
+    /// For each probe that turns with a wheel; `None` where the robot crashes.
+    out_of_round: Vec<Option<Vec<Power>>>,
+}
+
+impl Ripples {
+    /// Those of several recordings together.
+    pub(super) fn join(parts: &[&Self]) -> Self {
+        let sum = |parts: &[&Vec<Power>]| -> Vec<Power> {
+            let of_set = |set: usize| parts.iter().map(|part| &part[set]).sum();
+            (0..parts[0].len()).map(of_set).collect()
+        };
+        let round: Vec<&Vec<Power>> = parts.iter().map(|part| &part.round).collect();
+        let out_of_round = |wheel: usize| {
+            let of_wheel = parts.iter().map(|part| part.out_of_round[wheel].as_ref());
+            Some(sum(&of_wheel.collect::<Option<Vec<_>>>()?))
+        };
+        Self {
+            round: sum(&round),
+            out_of_round: (0..parts[0].out_of_round.len()).map(out_of_round).collect(),
+        }
+    }
+}
+
+impl Atlas {
+    /// How laps ripple beside some effects, of data sets in which wheels are round and of such with each wheel out of round.
+    pub(super) fn ripples(&self, simulate: &Simulate<'_>, others: &Hypothesis, round: Vec<Power>) -> Ripples {
+        let out_of_round = |probe: usize| {
+            let with = others.with(&wheel(self, probe, WHEEL_SHARE));
+            powers(simulate, &with.settings(self), WHEEL_SETS)
+        };
+        Ripples {
+            round,
+            out_of_round: wheels(&self.probes).map(out_of_round).collect(),
+        }
+    }
+}
+
 impl Trial<'_> {
     /// The wheel whose lines measured laps have most of, beside what some effects make of them; `None` where the robot crashes.
     pub(super) fn ripple(&self, runs: &[ObservedRun], others: &Hypothesis) -> Option<Ripple> {
-        let expected = self.spectra(others, SETS)?;
+        if others.parts.is_empty() {
+            return self.ripple_beyond(runs, &self.atlas.ripples);
+        }
+        self.atlas.spent.add(SETS + wheel_sets(&self.atlas.probes));
+        let round = powers(self.simulate, &others.settings(self.atlas), SETS)?;
+        self.ripple_beyond(runs, &self.atlas.ripples(self.simulate, others, round))
+    }
+
+    /// The same beyond how laps are expected to ripple.
+    fn ripple_beyond(&self, runs: &[ObservedRun], ripples: &Ripples) -> Option<Ripple> {
+        let expected: Vec<DVector<f64>> = ripples.round.iter().map(logarithms).collect();
+        if expected.is_empty() {
+            return None;
+        }
         let mean = mean(&expected);
-        let missing = lines(&(spectrum(runs) - &mean));
+        let missing = lines(&(logarithms(&power(runs)) - &mean));
         let scatters: Vec<DVector<f64>> = (expected.iter())
             .map(|spectrum| lines(&(spectrum - &mean)))
             .collect();
@@ -83,12 +155,9 @@ impl Trial<'_> {
         // The mean of the simulated spectra has an error too.
         let variance_of = |squares: f64| squares / freedom * (1.0 + 1.0 / scatters.len() as f64);
         let of_each = variance_of(scatters.iter().map(DVector::norm_squared).sum()) / missing.len() as f64;
-        let probes: Vec<usize> = (0..self.atlas.probes.len())
-            .filter(|&probe| self.atlas.probes[probe].turns())
-            .collect();
-        let ripple = |&probe: &usize| {
-            let with = others.with(&wheel(self.atlas, probe, WHEEL_SHARE));
-            let more = self::mean(&self.spectra(&with, WHEEL_SETS)?) - &mean;
+        let ripple = |(probe, with): (usize, &Option<Vec<Power>>)| {
+            let with: Vec<DVector<f64>> = with.as_ref()?.iter().map(logarithms).collect();
+            let more = self::mean(&with) - &mean;
             let direction = lines(&more).try_normalize(f64::MIN_POSITIVE)?;
             // Lines that lie side by side scatter together.
             let along = scatters
@@ -107,35 +176,35 @@ impl Trial<'_> {
                 probe,
                 share,
                 sigmas: missing.dot(&direction) / sigma,
-                tried: probes.len(),
+                tried: ripples.out_of_round.len(),
             })
         };
-        (probes.iter().filter_map(ripple)).max_by(|a, b| a.sigmas.total_cmp(&b.sigmas))
+        (wheels(&self.atlas.probes).zip(&ripples.out_of_round))
+            .filter_map(ripple)
+            .max_by(|a, b| a.sigmas.total_cmp(&b.sigmas))
     }
+}
 
-    fn spectra(&self, hypothesis: &Hypothesis, sets: u64) -> Option<Vec<DVector<f64>>> {
-        let settings = hypothesis.settings(self.atlas);
-        self.atlas.spent.add(sets);
-        (0..sets)
-            .into_par_iter()
-            .map(|set| (self.simulate)(&settings, set).map(|runs| spectrum(&runs)))
-            .collect()
-    }
+/// Of data sets simulated with these settings; `None` where the robot crashes.
+fn powers(simulate: &Simulate<'_>, settings: &[Setting], sets: u64) -> Option<Vec<Power>> {
+    (0..sets)
+        .into_par_iter()
+        .map(|set| simulate(settings, set).map(|runs| power(&runs)))
+        .collect()
 }
 
 fn mean(spectra: &[DVector<f64>]) -> DVector<f64> {
     spectra.iter().sum::<DVector<f64>>() / spectra.len() as f64
 }
 
-/// Log power of how laps deviate sideways from the means of their run's quarters, from [`LEAST_CYCLES`] cycles per lap to one in
-/// two gates.
-fn spectrum(runs: &[ObservedRun]) -> DVector<f64> {
+/// Of a data set; see [`Power`].
+pub(super) fn power(runs: &[ObservedRun]) -> Power {
     let vectors: Vec<Vec<DVector<f64>>> = (runs.iter())
         .map(|run| run.laps.iter().map(lap_vector).collect())
         .collect();
     let deviations: Vec<DVector<f64>> = deviations(&vectors).collect();
     let gates = deviations.first().map_or(0, |lap| lap.len() - BLOCKS);
-    let power = |cycles: usize| {
+    let at = |cycles: usize| -> f64 {
         let turn = TAU * cycles as f64 / gates as f64;
         let cos = DVector::from_fn(gates, |gate, _| (turn * gate as f64).cos());
         let sin = DVector::from_fn(gates, |gate, _| (turn * gate as f64).sin());
@@ -143,11 +212,13 @@ fn spectrum(runs: &[ObservedRun]) -> DVector<f64> {
             let positions_mm = lap.rows(0, gates);
             positions_mm.dot(&cos).powi(2) + positions_mm.dot(&sin).powi(2)
         };
-        let power: f64 = deviations.iter().map(of_lap).sum();
-        power.max(f64::MIN_POSITIVE).ln()
+        deviations.iter().map(of_lap).sum()
     };
-    let powers: Vec<f64> = (LEAST_CYCLES..=gates / 2).map(power).collect();
-    DVector::from_vec(powers)
+    Power::from_vec((LEAST_CYCLES..=gates / 2).map(at).collect())
+}
+
+fn logarithms(power: &Power) -> DVector<f64> {
+    power.map(|power| power.max(f64::MIN_POSITIVE).ln())
 }
 
 /// How much each of a spectrum's numbers is above the median of those about it.
@@ -189,7 +260,7 @@ mod tests {
 
     #[test]
     fn the_power_of_a_wave_is_at_its_frequency() {
-        let spectrum = spectrum(&waves(24.0, 0.002));
+        let spectrum = logarithms(&power(&waves(24.0, 0.002)));
         assert_eq!(spectrum.len(), 41);
         // Four laps a quarter of a turn apart have a mean of zero; each has (amplitude x gates / 2)^2.
         let expected = (16.0 * 100.0_f64.powi(2)).ln();

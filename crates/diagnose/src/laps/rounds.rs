@@ -172,8 +172,9 @@ impl Search<'_> {
     fn hunted_again(&self, mut descents: Vec<Descent>) -> Vec<Descent> {
         /// How far the other effects have moved from one time to the next.
         const MOVED: [Moved; 3] = [Moved::Far, Moved::Little, Moved::Little];
-        /// Share of the best score by which a descent may lie behind it and still be looked at.
+        /// Share of the best score by which a descent may lie behind it and still be looked at, and how many at most.
         const SHARE: f64 = 0.03;
+        const MOST: usize = 4;
         let held = |part: &Part| part.held.is_some();
         for moved in MOVED {
             let best = best_of(&descents).map(|best| &best.hypothesis);
@@ -189,9 +190,10 @@ impl Search<'_> {
                 (hunted.parts.iter().zip(&best.parts)).all(|(now, before)| now.is_within_error_of(before));
             let known: Vec<Part> = hunted.parts.into_iter().filter(held).collect();
             let least = before - NEAR.max(SHARE * before);
-            descents = (descents.into_par_iter())
-                .filter_map(|descent| {
-                    if descent.score < least {
+            descents.sort_by(|a, b| b.score.total_cmp(&a.score));
+            descents = (descents.into_par_iter().enumerate())
+                .filter_map(|(place, descent)| {
+                    if descent.score < least || place >= MOST {
                         return Some(descent);
                     }
                     let start = Descent::start(self.atlas(), &descent.hypothesis.with_held(&known));

@@ -96,7 +96,7 @@ pub(super) fn verdict_of(best: &Explanation) -> Verdict {
     let enough = match best.effects.len() {
         _ if best.has_no_name() => MOST,
         _ if best.score <= STRONG && !may_be_chance => return Verdict::Unexplained,
-        1 => ENOUGH,
+        1 if !may_be_chance => ENOUGH,
         _ => MOST,
     };
     let few_enough = if best.has_no_name() || best.share >= ALL_BUT_FAULTS {
@@ -126,6 +126,12 @@ fn noises(explanation: &Explanation) -> usize {
 /// Whether an effect changes nothing but chance.
 pub(super) fn is_noise(name: &str) -> bool {
     ["slip-level", "slip-memory", "reading-noise", "camera-noise"].contains(&name)
+}
+
+/// Whether an explanation by noise leaves something surely: in units of its own scatter all that is left is little, and the share that it
+/// explains says nothing.
+pub(super) fn hides_what_is_left(best: &Explanation) -> bool {
+    best.names().into_iter().any(is_noise) && !best.leaves_more_likely_than(SURELY_P)
 }
 
 /// More effects come before fewer only if each number of the further ones gains enough, and if they fit where the fewer do
@@ -248,6 +254,8 @@ mod tests {
             (&two[..], 1e-30, 0.95, 1500.0, false),
             (&two[..], 3e-4, 0.95, 1500.0, true),
             (&two[..], 3e-5, 0.95, 1500.0, false),
+            (&two[..1], 3e-4, 0.97, 400.0, true),
+            (&two[..1], 3e-5, 0.97, 400.0, false),
             (&two[..1], 1e-30, 0.97, 5000.0, false),
             (&two[..1], 1e-30, 0.99, 5000.0, true),
         ] {
