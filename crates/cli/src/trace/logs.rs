@@ -51,8 +51,13 @@ impl Logs {
 /// followed.
 fn read_all(recording: &Recording) -> Option<(Vec<Vec<LogRow>>, Vec<String>)> {
     let model = &recording.setup.model;
-    let runs = recording.measured.set.runs.iter();
-    let runs: Vec<_> = runs.map(|run| read(run, model)).collect::<Option<_>>()?;
+    let runs = recording.measured.set.runs.iter().enumerate();
+    let read = |(i, run): (usize, &RunFile)| {
+        let (mut rows, implausible) = read(run, model)?;
+        rows.first_mut()?.starts = recording.beginnings.is_known(i);
+        Some((rows, implausible))
+    };
+    let runs: Vec<_> = runs.map(read).collect::<Option<_>>()?;
     let (runs, implausible): (Vec<_>, Vec<_>) = runs.into_iter().unzip();
     let followed = runs.iter().any(|rows| can_be_followed(rows, model));
     followed.then(|| (runs, implausible.concat()))
@@ -63,6 +68,7 @@ fn read(run: &RunFile, model: &Model) -> Option<(Vec<LogRow>, Vec<String>)> {
     let log = run.rows.log.as_ref()?;
     let row = |(i, time_s): (usize, f64)| LogRow {
         time_s,
+        starts: false,
         observed: run.rows.position_m[i].map(|[x, y]| Vec2::new(x, y)),
         readings: log.readings[i],
         command: WheelSpeeds {

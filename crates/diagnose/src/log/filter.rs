@@ -1,7 +1,7 @@
 //! An extended Kalman filter over the pose, driven by the logged commands, with the camera's positions and all eight
 //! readings as measurements, one number after the other.
 
-use sim::{Forecast, Look, Outlook, Pose, PoseMatrix, Vec2, WheelSpeeds, World};
+use sim::{Forecast, Look, Outlook, Pose, PoseMatrix, Robot, RunRules, Vec2, WheelSpeeds, World};
 
 use super::evidence::SIGHT;
 use super::moments::{FINE, Likelihood, cut, likelihood_of_cut};
@@ -192,8 +192,11 @@ fn carried(p: &PoseMatrix, turned: Vec2) -> PoseMatrix {
 /// Standard deviation below which a reading is exact, counts, and no likelihood weighs it: they are written to 0.1 counts.
 const EXACT_COUNTS: f64 = 0.03;
 
-/// Control steps at the beginning that do not count: the start pose was fitted to them.
+/// Control steps at the beginning that do not count where a stretch begins in a run: how fast the robot then is is not known.
 const BURN_IN: usize = 48;
+
+/// Control steps at the beginning in which readings do not guide: the heading is a guess.
+const GUESSED: usize = 16;
 
 /// Filters one stretch. `used` says for each row what counts; without it all that is there does. `step_counts` is the
 /// step that the readings are rounded to.
@@ -226,10 +229,7 @@ fn filtered(
     mut each: impl FnMut(Instant),
 ) -> Option<f64> {
     let mut forecast = Forecast::new(world).ok()?;
-    let start = start_pose(rows, &forecast.machine().robot, world.rules())?;
-    let mut covariance = [[0.0; 3]; 3];
-    (covariance[0][0], covariance[1][1], covariance[2][2]) = (4e-6, 4e-6, 2.5e-3);
-    let mut state = State::new(start, covariance);
+    let (mut state, burn_in) = start(rows, &forecast.machine().robot, world.rules())?;
     state.memory = (forecast.kept() > 0.0).then(Memory::default);
     let mut log_likelihood = 0.0;
     for (i, row) in rows.iter().enumerate() {
@@ -243,7 +243,7 @@ fn filtered(
             &mut state,
             (row, step_counts),
             usable,
-            i >= BURN_IN,
+            i >= burn_in,
         );
         log_likelihood += instant.likelihood.ln();
         each(instant);
@@ -254,10 +254,27 @@ fn filtered(
     Some(log_likelihood)
 }
 
-/// What a row has; readings do not guide the very first steps, where the heading is a guess.
+/// The state before the first row of a stretch, and the number of rows that do not count. Where a run starts from rest, its first sighting
+/// alone tells where; elsewhere the way that it then drives does.
+fn start(rows: &[LogRow], robot: &Robot, rules: &RunRules) -> Option<(State, usize)> {
+    let diagonal = |position_m: f64, heading_rad: f64| {
+        let mut covariance = [[0.0; 3]; 3];
+        (covariance[0][0], covariance[1][1]) = (position_m.powi(2), position_m.powi(2));
+        covariance[2][2] = heading_rad.powi(2);
+        covariance
+    };
+    let guess = start_pose(rows, robot, rules)?;
+    let first = rows.first().filter(|row| row.starts);
+    Some(match first.and_then(|row| row.observed) {
+        Some(position) => (State::new(Pose { position, ..guess }, diagonal(0.05, 0.2)), 1),
+        None => (State::new(guess, diagonal(0.002, 0.05)), BURN_IN),
+    })
+}
+
+/// What a row has; readings do not guide the very first steps.
 fn available(row: &LogRow, index: usize) -> Used {
     let camera = if row.observed.is_some() { 0b11 } else { 0 };
-    if index < BURN_IN / 3 {
+    if index < GUESSED {
         return camera;
     }
     let finite = |lane: &usize| row.readings[*lane].is_finite();

@@ -140,6 +140,7 @@ mod tests {
             let seen = if (i / 100).is_multiple_of(2) { 900.0 } else { 0.0 };
             LogRow {
                 time_s,
+                starts: false,
                 observed: None,
                 readings: std::array::from_fn(|_| (seen + noise_counts * noise.normal()).max(0.0)),
                 command: WheelSpeeds {

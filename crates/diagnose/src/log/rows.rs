@@ -16,6 +16,8 @@ pub struct LoggedRun<'a> {
 pub struct LogRow {
     /// Time since the run began, s.
     pub time_s: f64,
+    /// Whether the robot starts here, from rest.
+    pub starts: bool,
     /// Where the camera saw the robot, m.
     pub observed: Option<Vec2>,
     /// The readings that the controller saw, counts; NaN where they are missing.
@@ -30,6 +32,7 @@ impl From<Step> for LogRow {
     fn from(step: Step) -> Self {
         Self {
             time_s: step.time_s,
+            starts: step.time_s == 0.0,
             observed: Some(step.observed),
             readings: step.readings,
             command: step.command,
@@ -43,6 +46,7 @@ impl LogRow {
     fn empty(time_s: f64) -> Self {
         Self {
             time_s,
+            starts: false,
             observed: None,
             readings: [f64::NAN; 8],
             command: UNKNOWN,

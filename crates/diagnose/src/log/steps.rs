@@ -94,6 +94,7 @@ mod tests {
                 let readings = std::array::from_fn(|lane| (10.0 * rounded(raw(lane))).round() / 10.0);
                 LogRow {
                     time_s: 0.064 * f64::from(i),
+                    starts: false,
                     observed: None,
                     readings,
                     command: WheelSpeeds::default(),
@@ -125,6 +126,7 @@ mod tests {
     fn finds_a_step_of_which_two_multiples_occur() {
         let of = |readings| LogRow {
             time_s: 0.0,
+            starts: false,
             observed: None,
             readings,
             command: WheelSpeeds::default(),
