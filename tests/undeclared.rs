@@ -234,6 +234,14 @@ fn motors_too_weak_to_start_at_once_are_known_by_how_runs_begin() {
         serde_json::json!(["start"]),
         "{found:#}"
     );
+    let [before, after, chance] =
+        ["before", "after", "chance"].map(|key| found["error"]["start_of_runs"][0][key].as_f64().unwrap());
+    // Late by an eighth of a second at 0.05 m/s.
+    assert!(
+        (0.002..0.005).contains(&before) && after < 3.0 * chance,
+        "{}",
+        found["error"]
+    );
 }
 
 /// Laps that go on for ever hardly tell this from wheels that lag: these do not start at once.

@@ -20,8 +20,8 @@ pub use corners::{Corners, other_cuts};
 pub use detectable::Detectable;
 pub use error::Error;
 pub use laps::{
-    Atlas, Baselines, Beginning, Departures, LapDiagnosis, ObservedLap, ObservedRun, Quadratic, Rival,
-    Simulate, Unseen, separations,
+    Atlas, Baselines, Beginning, Departures, LapDiagnosis, MeanBeginning, ObservedLap, ObservedRun,
+    Quadratic, Rival, Simulate, Unseen, separations,
 };
 pub use log::{
     Channel, Decided, Implausible, LogDiagnosis, LogRow, LoggedRun, Spoilt, can_be_followed, diagnose_logs,

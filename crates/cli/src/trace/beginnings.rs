@@ -1,16 +1,19 @@
 //! Which measured runs begin where their files do.
 
-use diagnose::{Beginning, Departures};
-use sim::Vec2;
+use anyhow::Result;
+use diagnose::{Beginning, Departures, MeanBeginning};
+use rayon::prelude::*;
+use sim::{Run, Setting, Streams, Vec2};
 
+use super::recording::RunPlace;
 use crate::laps::{Measured, SampledRun};
 use crate::setup::Setup;
 
 /// What is known of how the runs of a recording begin.
 #[derive(Debug)]
 pub(crate) struct Beginnings {
-    /// Whether it is known how each begins; of fewer than two of several it is not worth knowing.
-    known: Vec<bool>,
+    /// How each begins, if that is known; of fewer than two of several it is not worth knowing.
+    known: Vec<Option<Beginning>>,
     /// Runs in which the robot stands still where the file begins.
     standing: Vec<String>,
 }
@@ -28,11 +31,11 @@ impl Beginnings {
         };
         let found: Vec<Option<Beginning>> = (0..measured.runs.len()).map(beginning).collect();
         let stands = |found: &Beginning| found.stands(speed_m_s);
-        let mut known: Vec<bool> = (found.iter())
-            .map(|found| found.is_some_and(|found| !stands(&found)))
+        let mut known: Vec<Option<Beginning>> = (found.iter())
+            .map(|found| found.filter(|found| !stands(found)))
             .collect();
-        if known.iter().filter(|known| **known).count() < known.len().min(2) {
-            known.fill(false);
+        if known.iter().flatten().count() < known.len().min(2) {
+            known.fill(None);
         }
         let standing = (found.iter().zip(&measured.runs))
             .filter(|(found, _)| found.as_ref().is_some_and(stands))
@@ -45,12 +48,19 @@ impl Beginnings {
 
     /// Whether it is known how a run begins.
     pub(super) fn is_known(&self, run: usize) -> bool {
-        self.known[run]
+        self.known[run].is_some()
+    }
+
+    /// How the runs begin on average, as far as that is known.
+    pub(super) fn mean(&self) -> Option<MeanBeginning> {
+        let known: Vec<Beginning> = self.known.iter().flatten().copied().collect();
+        MeanBeginning::of(&known)
     }
 
     /// Which runs begin unknown, for a name of what is simulated for them; `None` if none does.
     pub(super) fn unknown(&self) -> Option<String> {
-        (self.known.contains(&false)).then(|| format!("begin {:?}", self.known))
+        let known: Vec<bool> = self.known.iter().map(Option::is_some).collect();
+        known.contains(&false).then(|| format!("begin {known:?}"))
     }
 
     /// What a reader must know of them.
@@ -63,6 +73,37 @@ impl Beginnings {
             )
         })
     }
+}
+
+/// How runs of a model with effects begin on average that take the places of some measured runs, in turn.
+///
+/// # Errors
+/// A model that cannot drive.
+pub(super) fn simulated_beginning(
+    setup: &Setup,
+    effects: &[Setting],
+    seed: u64,
+    places: &[RunPlace<'_>],
+) -> Result<Option<MeanBeginning>> {
+    const RUNS: u64 = 400;
+    /// Long enough for a beginning, s.
+    const DRIVEN_S: f64 = 1.5;
+    let steps = (DRIVEN_S / setup.model.run.control_step_s).ceil() as usize;
+    let mut model = setup.model.clone();
+    model.effects.extend_from_slice(effects);
+    let drive = |run: u64| -> Result<Option<Beginning>> {
+        let place = places[run as usize % places.len()];
+        let world = setup.scene.world(&model, place.number)?;
+        let mut run = Run::from_start(&world, Streams { seed, run }, place.start)?;
+        let path: Vec<(f64, Vec2)> = (0..steps)
+            .map(|_| run.step())
+            .map(|step| (step.time_s, step.observed))
+            .collect();
+        Ok(Beginning::of(&path))
+    };
+    let driven = (0..RUNS).into_par_iter().map(drive).collect::<Result<Vec<_>>>()?;
+    let begun: Vec<Beginning> = driven.into_iter().flatten().collect();
+    Ok(MeanBeginning::of(&begun))
 }
 
 /// What a reader must know where nothing but how runs begin departs from the declared model.

@@ -9,6 +9,7 @@ use rayon::prelude::*;
 use sim::{Setting, Streams};
 use track::Lap;
 
+use super::beginnings::{Beginnings, simulated_beginning};
 use super::recording::{HeldOut, Recording, RunPlace};
 use crate::laps::SampledRun;
 use crate::setup::Setup;
@@ -35,6 +36,17 @@ pub(crate) struct Errors {
     pub(crate) after_m: Vec<f64>,
     /// What it is for runs of the model with the effects, m.
     pub(crate) floor_m: Vec<f64>,
+    /// How far the robot is at the start of runs from where it is simulated to be, if that is known.
+    pub(crate) start: Option<StartError>,
+}
+
+/// How far a robot is, in the first four control steps of its runs on average, from where simulated ones are: root mean squares, mm.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct StartError {
+    pub(crate) before_mm: f64,
+    pub(crate) after_mm: f64,
+    /// What it is for as many runs of the model with the effects.
+    pub(crate) chance_mm: f64,
 }
 
 /// The errors of every recording; without data that no fit has seen each run is left out in turn.
@@ -84,7 +96,8 @@ impl Judged<'_> {
             let [before, after] = own.as_ref().unwrap_or(&all);
             distances_m.push(distances(run, before, after, after));
         }
-        Ok(self.errors(all, held_out.runs, &distances_m))
+        let start = self.start(&held_out.beginnings)?;
+        Ok(self.errors(all, held_out.runs, &distances_m, start))
     }
 
     /// The errors on each measured run, of sizes that were fitted to the others.
@@ -118,7 +131,8 @@ impl Judged<'_> {
             };
             distances_m.push(distances(run, &own_before, &own_after, of_chance));
         }
-        Ok(self.errors(all, runs.clone(), &distances_m))
+        let start = self.start(&recording.beginnings)?;
+        Ok(self.errors(all, runs.clone(), &distances_m, start))
     }
 
     /// The mean laps of the declared model and of that with the answer's effects, if it has any.
@@ -143,6 +157,7 @@ impl Judged<'_> {
         [before, after]: [MeanLaps; 2],
         held_out: Vec<SampledRun>,
         distances_m: &[[f64; 3]],
+        start: Option<StartError>,
     ) -> Errors {
         let of = |which: usize| distances_m.iter().map(|run| run[which]).collect();
         Errors {
@@ -153,7 +168,28 @@ impl Judged<'_> {
             before_m: of(0),
             after_m: of(1),
             floor_m: of(2),
+            start,
         }
+    }
+
+    /// The error at the start of runs that begin so.
+    fn start(&self, measured: &Beginnings) -> Result<Option<StartError>> {
+        let Some(measured) = measured.mean() else {
+            return Ok(None);
+        };
+        let simulated = |effects: &[Setting]| {
+            let places = self.recording.places(effects);
+            simulated_beginning(&self.recording.setup, effects, self.seed + SEED_OFFSET, &places)
+        };
+        let both = (simulated(&[])?, simulated(&self.answer.settings())?);
+        let (Some(before), Some(after)) = both else {
+            return Ok(None);
+        };
+        Ok(Some(StartError {
+            before_mm: before.distance_mm(&measured),
+            after_mm: after.distance_mm(&measured),
+            chance_mm: after.chance_mm(&measured),
+        }))
     }
 }
 

@@ -254,6 +254,11 @@ fn error_table(trace: &Trace) -> Table {
             off(&errors.after),
             "0".into(),
         ]);
+        if let Some(start) = errors.start {
+            let shown = [start.before_mm, start.after_mm, start.chance_mm].map(|mm| format!("{mm:.2}"));
+            let [before, after, chance] = shown;
+            table.push([format!("{of}start of runs, rms, mm"), before, after, chance]);
+        }
         for modes in [2, 10] {
             let distance = |laps: &MeanLaps| {
                 distance(laps, &errors.held_out, modes).map_or("-".into(), |d| format!("{d:.2}"))

@@ -329,6 +329,8 @@ pub(super) struct HeldOut {
     pub(super) runs: Vec<SampledRun>,
     /// Where in its laps the camera did not see the robot, run by run.
     pub(super) unseen: Vec<Unseen>,
+    /// How they begin, as far as that is known.
+    pub(super) beginnings: Beginnings,
 }
 
 impl HeldOut {
@@ -354,6 +356,7 @@ impl HeldOut {
         Ok(Self {
             recording: place,
             unseen: unseen(&measured, setup.model.run.control_step_s),
+            beginnings: Beginnings::of(&measured, setup),
             runs: measured.runs,
         })
     }

@@ -76,6 +76,43 @@ impl Beginning {
     }
 }
 
+/// How runs begin on average.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MeanBeginning {
+    ahead_mm: [f64; BEGINNING],
+    /// Of one run's numbers, mm^2, on average over them.
+    variance: f64,
+    runs: usize,
+}
+
+impl MeanBeginning {
+    /// The mean of some runs; `None` of none.
+    pub fn of(runs: &[Beginning]) -> Option<Self> {
+        let count = runs.len() as f64;
+        let number = |i: usize| runs.iter().map(move |run| run.ahead_mm[i]);
+        let ahead_mm = std::array::from_fn(|i| number(i).sum::<f64>() / count);
+        let squares = |i: usize| number(i).map(|mm| (mm - ahead_mm[i]).powi(2)).sum::<f64>();
+        let squares = (0..BEGINNING).map(squares).sum::<f64>();
+        (!runs.is_empty()).then(|| Self {
+            ahead_mm,
+            variance: squares / (count - 1.0).max(1.0) / BEGINNING as f64,
+            runs: runs.len(),
+        })
+    }
+
+    /// How far the robot is from where it is in others at the same time since the start: root mean square over four times, mm.
+    pub fn distance_mm(&self, other: &Self) -> f64 {
+        let pairs = self.ahead_mm.iter().zip(&other.ahead_mm);
+        let squares: f64 = pairs.map(|(a, b)| (a - b).powi(2)).sum();
+        (squares / BEGINNING as f64).sqrt()
+    }
+
+    /// What that distance is to the mean of as many runs as others are, if these are runs of the same robot, mm.
+    pub fn chance_mm(&self, others: &Self) -> f64 {
+        (self.variance / others.runs as f64).sqrt()
+    }
+}
+
 /// The mean of some values; `None` of none.
 fn mean<T: Add<Output = T> + Div<f64, Output = T>>(values: impl Iterator<Item = T>) -> Option<T> {
     let (sum, count) = (values.map(|value| (value, 1.0))).reduce(|a, b| (a.0 + b.0, a.1 + b.1))?;
@@ -133,6 +170,23 @@ mod tests {
             let found = Beginning::of(&path(0.0, gone_m)).unwrap();
             assert!(found.stands(SPEED_M_S), "{waits_s}: {found:?}");
         }
+    }
+
+    #[test]
+    fn mean_beginnings_are_apart_by_the_root_of_their_mean_square() {
+        let run = |ahead_mm: f64| Beginning {
+            ahead_mm: [ahead_mm, 0.0, 0.0, 0.0],
+            moved_m: 0.015,
+        };
+        let (near, far) = (
+            MeanBeginning::of(&[run(1.0), run(3.0)]),
+            MeanBeginning::of(&[run(8.0)]),
+        );
+        let (near, far) = (near.unwrap(), far.unwrap());
+        assert_eq!(near.distance_mm(&far), 3.0);
+        // A variance of 2 in one number of four.
+        assert!((near.chance_mm(&far) - 0.5_f64.sqrt()).abs() < 1e-12);
+        assert_eq!(MeanBeginning::of(&[]), None);
     }
 
     #[test]

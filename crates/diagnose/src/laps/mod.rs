@@ -52,7 +52,7 @@ mod separation;
 
 pub use atlas::{Atlas, Simulate};
 pub use baseline::Baselines;
-pub use beginning::Beginning;
+pub use beginning::{Beginning, MeanBeginning};
 pub use diagnosis::LapDiagnosis;
 pub use observed::{ObservedLap, ObservedRun};
 pub use separation::{Rival, separations};
