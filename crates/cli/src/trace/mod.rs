@@ -19,7 +19,7 @@ mod unnamed;
 use std::path::Path;
 
 use anyhow::Result;
-use diagnose::{Answer, Baselines, Decided, Departures, Detectable};
+use diagnose::{Answer, Baselines, Decided, Departures, Detectable, Verdict};
 
 use answer::{FromLogs, TracedLaps};
 use atlas::{Purpose, laps_simulated};
@@ -123,7 +123,9 @@ impl Trace {
         progress.message("simulating the error before and after");
         let errors = errors(&recordings, &named.answer, held_out, seed)?;
         interrupt::check()?;
-        remarks.extend(only_beginnings_depart(&named.residual));
+        if named.answer.verdict != Verdict::Faithful {
+            remarks.extend(only_beginnings_depart(&named.residual));
+        }
         if let (Some(found), Some(logs)) = (&named.from_logs, &logged) {
             remarks.extend(unused_in_words(&recordings, logs, &found.logs));
             if matches!(found.logs.decide, Decided::NoController { .. }) {
