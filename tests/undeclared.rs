@@ -209,12 +209,17 @@ pub(crate) fn limping() -> Robot {
     Robot::with(Setting::constant(&LIMP, [LIMPING]))
 }
 
-#[test]
-fn a_listed_effect_under_another_name_is_named_from_laps() {
+/// What is said of the reactive robot by its laps alone.
+fn by_laps(robot: &Robot) -> Value {
     share_signatures("braitenberg");
     let scratch = Scratch::new();
-    limping().record(&scratch, "set");
-    let found = trace(&scratch, "braitenberg", "set", &[]);
+    robot.record(&scratch, "set");
+    trace(&scratch, "braitenberg", "set", &[])
+}
+
+#[test]
+fn a_listed_effect_under_another_name_is_named_from_laps() {
+    let found = by_laps(&limping());
     says(&found, "explained", &["wheel-asymmetry"]);
     holds(&found["effects"][0], "ratio", LIMPING, 1.0);
 }
@@ -223,10 +228,7 @@ fn a_listed_effect_under_another_name_is_named_from_laps() {
 #[test]
 fn motors_too_weak_to_start_at_once_are_known_by_how_runs_begin() {
     const M_S2: f64 = 0.2;
-    share_signatures("braitenberg");
-    let scratch = Scratch::new();
-    Robot::with(Setting::constant(&WEAK, [M_S2])).record(&scratch, "set");
-    let found = trace(&scratch, "braitenberg", "set", &[]);
+    let found = by_laps(&Robot::with(Setting::constant(&WEAK, [M_S2])));
     says(&found, "explained", &["acceleration-limit"]);
     holds(&found["effects"][0], "m_s2", M_S2, 0.0);
     assert_eq!(
@@ -247,10 +249,10 @@ fn motors_too_weak_to_start_at_once_are_known_by_how_runs_begin() {
 /// Laps that go on for ever hardly tell this from wheels that lag: these do not start at once.
 #[test]
 fn sensors_that_lag_are_no_lag_of_the_wheels() {
-    share_signatures("braitenberg");
-    let scratch = Scratch::new();
-    Robot::with(Setting::constant(sim::find("sensor-lag").unwrap(), [0.13])).record(&scratch, "set");
-    let found = trace(&scratch, "braitenberg", "set", &[]);
+    let found = by_laps(&Robot::with(Setting::constant(
+        sim::find("sensor-lag").unwrap(),
+        [0.13],
+    )));
     says(&found, "explained", &["sensor-lag"]);
     assert_eq!(
         found["effects"][0]["alternatives"],
@@ -262,10 +264,10 @@ fn sensors_that_lag_are_no_lag_of_the_wheels() {
 #[test]
 fn a_battery_that_sags_is_sized_wherever_the_runs_began() {
     const PER_S: f64 = 1.5e-4;
-    share_signatures("braitenberg");
-    let scratch = Scratch::new();
-    Robot::with(Setting::constant(sim::find("battery-sag").unwrap(), [PER_S])).record(&scratch, "set");
-    let found = trace(&scratch, "braitenberg", "set", &[]);
+    let found = by_laps(&Robot::with(Setting::constant(
+        sim::find("battery-sag").unwrap(),
+        [PER_S],
+    )));
     says(&found, "explained", &["battery-sag"]);
     holds(&found["effects"][0], "per_s", PER_S, 0.0);
 }
@@ -295,11 +297,8 @@ fn sensors_that_warm_up_have_no_name_and_settle() {
 #[test]
 fn a_marker_far_ahead_is_there_in_every_run() {
     const FORWARD_M: f64 = 0.0157;
-    share_signatures("braitenberg");
-    let scratch = Scratch::new();
     let marker = Setting::constant(sim::find("marker-offset").unwrap(), [FORWARD_M, 0.0, 0.0]);
-    Robot::with(marker).record(&scratch, "set");
-    let found = trace(&scratch, "braitenberg", "set", &[]);
+    let found = by_laps(&Robot::with(marker));
     says(&found, "explained", &["marker-offset"]);
     assert!(found["effects"][0]["by"].is_null(), "{found:#}");
 }
@@ -308,14 +307,11 @@ fn a_marker_far_ahead_is_there_in_every_run() {
 fn a_rounding_of_readings_is_found_beside_a_gain_that_hides_its_size() {
     // Without a gain a rounding of 127 counts explains most.
     const COUNTS: f64 = 122.4;
-    share_signatures("braitenberg");
-    let scratch = Scratch::new();
     let mut robot = Robot::with(Setting::constant(sim::find("reading-step").unwrap(), [COUNTS]));
     robot
         .effects
         .push(Setting::constant(sim::find("controller-gain").unwrap(), [1.156]));
-    robot.record(&scratch, "set");
-    let found = trace(&scratch, "braitenberg", "set", &[]);
+    let found = by_laps(&robot);
     assert_eq!(found["verdict"], "explained", "{found:#}");
     let (step, gain) = match names(&found).as_slice() {
         ["reading-step", gain] => (0, *gain),
@@ -332,15 +328,12 @@ fn a_light_that_goes_over_the_runs_is_seen_beside_wheels_that_slip_much() {
     const SLIP: f64 = 4.2;
     const COUNTS: [f64; 4] = [43.7, 17.3, 11.4, 6.9];
     const AZIMUTH_RAD: f64 = 2.126;
-    share_signatures("braitenberg");
-    let scratch = Scratch::new();
     let mut robot = Robot::with(Setting::constant(sim::find("slip-level").unwrap(), [SLIP]));
     robot.effects.push(Setting {
         spec: sim::find("directional-light").unwrap(),
         pattern: Pattern::ByRun(COUNTS.map(|counts| vec![counts, AZIMUTH_RAD]).to_vec()),
     });
-    robot.record(&scratch, "set");
-    let found = trace(&scratch, "braitenberg", "set", &[]);
+    let found = by_laps(&robot);
     assert_eq!(found["verdict"], "explained", "{found:#}");
     let effects = found["effects"].as_array().unwrap();
     let of = |name: &str| effects.iter().find(|effect| effect["name"] == name);
@@ -362,10 +355,10 @@ fn a_light_that_goes_over_the_runs_is_seen_beside_wheels_that_slip_much() {
 #[test]
 fn quieter_sensors_are_found_where_the_mean_lap_says_next_to_nothing() {
     const FACTOR: f64 = 0.4;
-    share_signatures("braitenberg");
-    let scratch = Scratch::new();
-    Robot::with(Setting::constant(sim::find("reading-noise").unwrap(), [FACTOR])).record(&scratch, "set");
-    let found = trace(&scratch, "braitenberg", "set", &[]);
+    let found = by_laps(&Robot::with(Setting::constant(
+        sim::find("reading-noise").unwrap(),
+        [FACTOR],
+    )));
     assert_eq!(found["verdict"], "explained", "{found:#}");
     // A small offset does much the same.
     let candidates = found["candidates"].as_array().unwrap();
@@ -464,10 +457,7 @@ fn a_dead_band_just_below_most_commands_is_found_in_logs() {
 #[test]
 fn a_wheel_out_of_round_is_known_by_how_laps_ripple() {
     const SHARE: f64 = 0.12;
-    share_signatures("braitenberg");
-    let scratch = Scratch::new();
-    Robot::with(Setting::constant(&LOBED, [SHARE])).record(&scratch, "set");
-    let found = trace(&scratch, "braitenberg", "set", &[]);
+    let found = by_laps(&Robot::with(Setting::constant(&LOBED, [SHARE])));
     says(&found, "explained", &["unlisted"]);
     let share = without_name(&found, OUT_OF_ROUND)[0];
     assert!((share - SHARE).abs() < 0.15 * SHARE, "{found:#}");
@@ -504,10 +494,7 @@ fn a_wheel_out_of_round_is_one_wheel_in_logs() {
 #[test]
 fn a_tilted_camera_is_known_by_its_scale_over_the_floor() {
     const PER_M: f64 = 0.03;
-    share_signatures("braitenberg");
-    let scratch = Scratch::new();
-    Robot::with(Setting::constant(&TILTED, [PER_M])).record(&scratch, "set");
-    let found = trace(&scratch, "braitenberg", "set", &[]);
+    let found = by_laps(&Robot::with(Setting::constant(&TILTED, [PER_M])));
     says(&found, "explained", &["unlisted"]);
     let coefficients = without_name(&found, ["observe", "camera scale", "place", "polynomial"]);
     assert!((coefficients[1] - PER_M).abs() < 0.1 * PER_M, "{found:#}");
@@ -520,10 +507,7 @@ fn a_tilted_camera_is_known_by_its_scale_over_the_floor() {
 #[test]
 fn a_rug_is_an_area_of_the_floor_on_which_wheels_are_slower() {
     const SHARE: f64 = 0.15;
-    share_signatures("braitenberg");
-    let scratch = Scratch::new();
-    Robot::with(Setting::constant(&RUG, [SHARE])).record(&scratch, "set");
-    let found = trace(&scratch, "braitenberg", "set", &[]);
+    let found = by_laps(&Robot::with(Setting::constant(&RUG, [SHARE])));
     assert_ne!(found["verdict"], "unexplained", "{found:#}");
     let [share, x_m, ..] = without_name(&found, ["act", "wheel speed", "place", "area"])[..] else {
         panic!("{found:#}");
@@ -535,10 +519,8 @@ fn a_rug_is_an_area_of_the_floor_on_which_wheels_are_slower() {
 
 #[test]
 fn a_carpet_with_a_grain_has_no_name_in_laps() {
-    share_signatures("braitenberg");
-    let scratch = Scratch::new();
-    Robot::with(Setting::constant(&GRAIN, [0.04])).record(&scratch, "set");
-    never_a_listed_name(&trace(&scratch, "braitenberg", "set", &[]), "act");
+    let found = by_laps(&Robot::with(Setting::constant(&GRAIN, [0.04])));
+    never_a_listed_name(&found, "act");
 }
 
 #[test]

@@ -79,7 +79,7 @@ impl Beginning {
 /// How runs begin on average.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MeanBeginning {
-    ahead_mm: [f64; BEGINNING],
+    pub(super) ahead_mm: [f64; BEGINNING],
     /// Of one run's numbers, mm^2, on average over them.
     variance: f64,
     runs: usize,

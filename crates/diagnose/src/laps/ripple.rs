@@ -16,7 +16,7 @@ use super::hypothesis::Hypothesis;
 use super::observed::ObservedRun;
 use super::part::Part;
 use super::probe::Probe;
-use super::summary::{BLOCKS, deviations, lap_vector};
+use super::summary::{BLOCKS, deviations, lap_vector, of_each};
 use super::tests_of_fit::Quadratic;
 use super::trial::Trial;
 
@@ -199,10 +199,7 @@ fn mean(spectra: &[DVector<f64>]) -> DVector<f64> {
 
 /// Of a data set; see [`Power`].
 pub(super) fn power(runs: &[ObservedRun]) -> Power {
-    let vectors: Vec<Vec<DVector<f64>>> = (runs.iter())
-        .map(|run| run.laps.iter().map(lap_vector).collect())
-        .collect();
-    let deviations: Vec<DVector<f64>> = deviations(&vectors).collect();
+    let deviations: Vec<DVector<f64>> = deviations(&of_each(runs, lap_vector)).collect();
     let gates = deviations.first().map_or(0, |lap| lap.len() - BLOCKS);
     let at = |cycles: usize| -> f64 {
         let turn = TAU * cycles as f64 / gates as f64;

@@ -5,7 +5,7 @@ use std::ops::Range;
 use nalgebra::{DMatrix, DVector};
 use statrs::statistics::{Data, OrderStatistics};
 
-use super::beginning::BEGINNING;
+use super::beginning::{Beginning, MeanBeginning};
 use super::layout::ramp_norm;
 use super::observed::{ObservedLap, ObservedRun};
 
@@ -79,8 +79,6 @@ impl Summary {
 pub(super) struct Recording {
     pub(super) runs: Vec<RunSummary>,
     /// See [`second_order`]; behind them the numbers of a run's [`Beginning`], on average, where it is known of any.
-    ///
-    /// [`Beginning`]: super::beginning::Beginning
     pub(super) second: DVector<f64>,
     /// Scatter of the laps about their run's line, and its degrees of freedom.
     pub(super) scatter: DMatrix<f64>,
@@ -129,17 +127,19 @@ pub(super) fn lap_vectors(runs: &[ObservedRun]) -> Vec<Vec<DVector<f64>>> {
     brought_near(of_each(runs, lap_vector))
 }
 
-fn of_each(runs: &[ObservedRun], vector: fn(&ObservedLap) -> DVector<f64>) -> Vec<Vec<DVector<f64>>> {
+/// What a vector of each lap of each run is.
+pub(super) fn of_each(
+    runs: &[ObservedRun],
+    vector: fn(&ObservedLap) -> DVector<f64>,
+) -> Vec<Vec<DVector<f64>>> {
     let of_run = |run: &ObservedRun| run.laps.iter().map(vector).collect();
     runs.iter().map(of_run).collect()
 }
 
 /// How runs begin on average, of those of which it is known; `None` if it is known of none.
 fn mean_beginning(runs: &[ObservedRun]) -> Option<DVector<f64>> {
-    let known = || runs.iter().filter_map(|run| run.beginning);
-    let sum = |i: usize| known().map(|beginning| beginning.ahead_mm[i]).sum::<f64>();
-    let count = known().count();
-    (count > 0).then(|| DVector::from_fn(BEGINNING, |i, _| sum(i) / count as f64))
+    let known: Vec<Beginning> = runs.iter().filter_map(|run| run.beginning).collect();
+    MeanBeginning::of(&known).map(|mean| DVector::from_row_slice(&mean.ahead_mm))
 }
 
 fn joined(a: &DVector<f64>, b: &DVector<f64>) -> DVector<f64> {
