@@ -211,10 +211,13 @@ pub(crate) fn limping() -> Robot {
 
 /// What is said of the reactive robot by its laps alone.
 fn by_laps(robot: &Robot) -> Value {
+    by_laps_in(&Scratch::new(), robot)
+}
+
+fn by_laps_in(scratch: &Scratch, robot: &Robot) -> Value {
     share_signatures("braitenberg");
-    let scratch = Scratch::new();
-    robot.record(&scratch, "set");
-    trace(&scratch, "braitenberg", "set", &[])
+    robot.record(scratch, "set");
+    trace(scratch, "braitenberg", "set", &[])
 }
 
 #[test]
@@ -228,7 +231,8 @@ fn a_listed_effect_under_another_name_is_named_from_laps() {
 #[test]
 fn motors_too_weak_to_start_at_once_are_known_by_how_runs_begin() {
     const M_S2: f64 = 0.2;
-    let found = by_laps(&Robot::with(Setting::constant(&WEAK, [M_S2])));
+    let scratch = Scratch::new();
+    let found = by_laps_in(&scratch, &Robot::with(Setting::constant(&WEAK, [M_S2])));
     says(&found, "explained", &["acceleration-limit"]);
     holds(&found["effects"][0], "m_s2", M_S2, 0.0);
     assert_eq!(
@@ -244,6 +248,17 @@ fn motors_too_weak_to_start_at_once_are_known_by_how_runs_begin() {
         "{}",
         found["error"]
     );
+    // The figure and its numbers.
+    assert!(scratch.path("out/figures/starts.svg").is_file());
+    let table = scratch.read("out/starts.csv");
+    let off_mm = |line: &str| {
+        let [_, _, measured, simulated, _] = line.split(',').collect::<Vec<_>>().try_into().unwrap();
+        measured.parse::<f64>().unwrap() - simulated.parse::<f64>().unwrap()
+    };
+    let off_mm: Vec<f64> = table.lines().skip(1).map(off_mm).collect();
+    assert_eq!(off_mm.len(), 4, "{table}");
+    let rms_mm = (off_mm.iter().map(|mm| mm * mm).sum::<f64>() / 4.0).sqrt();
+    assert!((1e-3 * rms_mm - before).abs() < 2e-6, "{table}");
 }
 
 /// Laps that go on for ever hardly tell this from wheels that lag: these do not start at once.

@@ -10,7 +10,7 @@ use crate::output::{OutDir, Work};
 use crate::report::Report;
 use crate::session::Session;
 use crate::setup;
-use crate::trace::{Cache, Trace, document, gates_csv, sections, summary};
+use crate::trace::{Cache, Trace, document, gates_csv, sections, starts_csv, summary};
 
 pub(crate) fn run(session: &Session, args: &args::Trace) -> Result<()> {
     let file = setup::model_file(&args.model)?;
@@ -37,6 +37,7 @@ pub(crate) fn run(session: &Session, args: &args::Trace) -> Result<()> {
         folder.write(&format!("figures/{}.svg", picture.file), picture.figure.to_svg()?)?;
     }
     folder.write("gates.csv", gates_csv(&trace))?;
+    folder.write("starts.csv", starts_csv(&trace))?;
     for (number, table) in sections.iter().flat_map(Section::tables).enumerate() {
         folder.write(&format!("tables/{:02}.csv", number + 1), table.to_csv())?;
     }

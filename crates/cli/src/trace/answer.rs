@@ -7,7 +7,7 @@ use diagnose::{
 };
 use sim::{Pattern, Setting, Vec2};
 
-use super::atlas::{Purpose, atlas};
+use super::atlas::{Purpose, atlas, keep_what_was_added};
 use super::cache::Cache;
 use super::logs::Logs;
 use super::recording::{Recording, Seeds, observed_runs, simulate_all};
@@ -26,6 +26,7 @@ pub(crate) struct FromLogs {
 /// The laps of some recordings, and what the declared model leads one to expect of them.
 pub(super) struct TracedLaps<'a> {
     pub(super) atlas: Atlas,
+    purpose: Purpose,
     recordings: Vec<&'a Recording>,
     runs: Vec<ObservedRun>,
     seed: u64,
@@ -52,9 +53,15 @@ impl<'a> TracedLaps<'a> {
         Ok(Self {
             runs: observed_runs(&recordings)?,
             atlas: atlas(session, &recordings, purpose, cache)?,
+            purpose,
             recordings,
             seed: session.seed(),
         })
+    }
+
+    /// Keeps the signatures that the diagnosis has added.
+    pub(super) fn keep_what_was_added(&self, session: &Session, cache: &Cache) {
+        keep_what_was_added(session, &self.atlas, &self.recordings, self.purpose, cache);
     }
 
     fn simulate(&self, effects: &[Setting], set: u64) -> Option<Vec<ObservedRun>> {

@@ -67,16 +67,25 @@ pub(super) fn atlas(
     Ok(Atlas::join(parts).expect("at least one data set is measured"))
 }
 
-/// A recording's atlas, from the cache or made now; delays in it come in steps that all recordings share.
-fn atlas_of(
+/// Keeps the atlas of some recordings anew if a diagnosis has added to it: of one recording, whose it then is.
+pub(super) fn keep_what_was_added(
     session: &Session,
-    recording: &Recording,
-    (purpose, physics_step_s): (Purpose, f64),
+    atlas: &Atlas,
+    recordings: &[&Recording],
+    purpose: Purpose,
     cache: &Cache,
-) -> Result<Atlas> {
+) {
+    if let ([recording], true) = (recordings, atlas.has_grown()) {
+        let physics_step_s = recording.setup.model.run.physics_step_s();
+        // That it cannot be kept was said when it was made.
+        let _ = cache.put(&key_of(session, recording, purpose, physics_step_s), atlas);
+    }
+}
+
+/// What decides the contents of a recording's atlas.
+fn key_of(session: &Session, recording: &Recording, purpose: Purpose, physics_step_s: f64) -> String {
     let Recording { config, world, .. } = recording;
     let shape = recording.shape();
-    let alike = recording.expects_the_same_of_runs();
     let mut key = format!(
         "{}\n{purpose:?}\n{}\n{world}\n{shape:?}\n{}",
         Atlas::RECIPE,
@@ -86,7 +95,7 @@ fn atlas_of(
     if let Some(unit_m) = recording.written_m {
         key += &format!("\npositions in {unit_m} m");
     }
-    if !alike {
+    if !recording.expects_the_same_of_runs() {
         key += &format!("\n{:?}", recording.places(&[]));
     }
     if let Some(begin) = recording.beginnings.unknown() {
@@ -95,6 +104,18 @@ fn atlas_of(
     if physics_step_s != recording.setup.model.run.physics_step_s() {
         key += &format!("\ndelays in {physics_step_s} s");
     }
+    key
+}
+
+/// A recording's atlas, from the cache or made now; delays in it come in steps that all recordings share.
+fn atlas_of(
+    session: &Session,
+    recording: &Recording,
+    (purpose, physics_step_s): (Purpose, f64),
+    cache: &Cache,
+) -> Result<Atlas> {
+    let key = key_of(session, recording, purpose, physics_step_s);
+    let alike = recording.expects_the_same_of_runs();
     if let Some(atlas) = cache.get(&key, physics_step_s) {
         return Ok(atlas);
     }

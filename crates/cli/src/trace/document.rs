@@ -6,7 +6,7 @@ use sim::Pattern;
 
 use super::Trace;
 use super::answer::{FromLogs, rivals};
-use super::errors::StartError;
+use super::errors::Starts;
 use super::next::Experiment;
 
 /// The document of a trace.
@@ -25,7 +25,7 @@ pub(crate) fn document(trace: &Trace) -> Value {
             "before": trace.mean_m(|e| &e.before_m), "after": trace.mean_m(|e| &e.after_m),
             "floor": trace.mean_m(|e| &e.floor_m),
             "held_out": trace.held_out().map(|run| run.name.clone()).collect::<Vec<_>>(),
-            "start_of_runs": trace.errors.iter().map(|errors| errors.start.map(start)).collect::<Vec<_>>(),
+            "start_of_runs": trace.errors.iter().map(|errors| errors.starts.as_ref().map(starts)).collect::<Vec<_>>(),
         },
         "candidates": answer.explanations.iter().map(|e| candidate(e, trace.laps_alone())).collect::<Vec<_>>(),
         "separate_with": trace.experiments.iter().map(experiment).collect::<Vec<_>>(),
@@ -97,11 +97,10 @@ fn quadratic(q: &Quadratic) -> Value {
     json!({ "q": q.q, "df": q.freedom, "excess": q.excess(), "p": q.p })
 }
 
-fn start(error: StartError) -> Value {
+fn starts(starts: &Starts) -> Value {
     const M_PER_MM: f64 = 1e-3;
-    json!({
-        "before": M_PER_MM * error.before_mm, "after": M_PER_MM * error.after_mm, "chance": M_PER_MM * error.chance_mm,
-    })
+    let [before, after, chance] = starts.errors_mm().map(|mm| M_PER_MM * mm);
+    json!({ "before": before, "after": after, "chance": chance })
 }
 
 fn departures(numbers: &Departures) -> Value {

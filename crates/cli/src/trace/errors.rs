@@ -4,7 +4,7 @@ use std::borrow::Cow;
 use std::ops::Range;
 
 use anyhow::Result;
-use diagnose::{Answer, MeanLaps, Unseen};
+use diagnose::{Answer, MeanBeginning, MeanLaps, Unseen};
 use rayon::prelude::*;
 use sim::{Setting, Streams};
 use track::Lap;
@@ -36,17 +36,28 @@ pub(crate) struct Errors {
     pub(crate) after_m: Vec<f64>,
     /// What it is for runs of the model with the effects, m.
     pub(crate) floor_m: Vec<f64>,
-    /// How far the robot is at the start of runs from where it is simulated to be, if that is known.
-    pub(crate) start: Option<StartError>,
+    /// How runs start, if that is known.
+    pub(crate) starts: Option<Starts>,
 }
 
-/// How far a robot is, in the first four control steps of its runs on average, from where simulated ones are: root mean squares, mm.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct StartError {
-    pub(crate) before_mm: f64,
-    pub(crate) after_mm: f64,
-    /// What it is for as many runs of the model with the effects.
-    pub(crate) chance_mm: f64,
+/// How runs start on average.
+#[derive(Debug)]
+pub(crate) struct Starts {
+    pub(crate) measured: MeanBeginning,
+    pub(crate) before: MeanBeginning,
+    pub(crate) after: MeanBeginning,
+}
+
+impl Starts {
+    /// How far the robot is, in the first four control steps of its runs, from where it is simulated to be before and after, and what
+    /// that is for as many runs of the model with the effects: root mean squares, mm.
+    pub(crate) fn errors_mm(&self) -> [f64; 3] {
+        [
+            self.before.distance_mm(&self.measured),
+            self.after.distance_mm(&self.measured),
+            self.after.chance_mm(&self.measured),
+        ]
+    }
 }
 
 /// The errors of every recording; without data that no fit has seen each run is left out in turn.
@@ -96,8 +107,8 @@ impl Judged<'_> {
             let [before, after] = own.as_ref().unwrap_or(&all);
             distances_m.push(distances(run, before, after, after));
         }
-        let start = self.start(&held_out.beginnings)?;
-        Ok(self.errors(all, held_out.runs, &distances_m, start))
+        let starts = self.starts(&held_out.beginnings)?;
+        Ok(self.errors(all, held_out.runs, &distances_m, starts))
     }
 
     /// The errors on each measured run, of sizes that were fitted to the others.
@@ -131,8 +142,8 @@ impl Judged<'_> {
             };
             distances_m.push(distances(run, &own_before, &own_after, of_chance));
         }
-        let start = self.start(&recording.beginnings)?;
-        Ok(self.errors(all, runs.clone(), &distances_m, start))
+        let starts = self.starts(&recording.beginnings)?;
+        Ok(self.errors(all, runs.clone(), &distances_m, starts))
     }
 
     /// The mean laps of the declared model and of that with the answer's effects, if it has any.
@@ -157,7 +168,7 @@ impl Judged<'_> {
         [before, after]: [MeanLaps; 2],
         held_out: Vec<SampledRun>,
         distances_m: &[[f64; 3]],
-        start: Option<StartError>,
+        starts: Option<Starts>,
     ) -> Errors {
         let of = |which: usize| distances_m.iter().map(|run| run[which]).collect();
         Errors {
@@ -168,12 +179,12 @@ impl Judged<'_> {
             before_m: of(0),
             after_m: of(1),
             floor_m: of(2),
-            start,
+            starts,
         }
     }
 
-    /// The error at the start of runs that begin so.
-    fn start(&self, measured: &Beginnings) -> Result<Option<StartError>> {
+    /// How runs start that begin so, if that is known.
+    fn starts(&self, measured: &Beginnings) -> Result<Option<Starts>> {
         let Some(measured) = measured.mean() else {
             return Ok(None);
         };
@@ -185,10 +196,10 @@ impl Judged<'_> {
         let (Some(before), Some(after)) = both else {
             return Ok(None);
         };
-        Ok(Some(StartError {
-            before_mm: before.distance_mm(&measured),
-            after_mm: after.distance_mm(&measured),
-            chance_mm: after.chance_mm(&measured),
+        Ok(Some(Starts {
+            measured,
+            before,
+            after,
         }))
     }
 }

@@ -31,7 +31,7 @@ use errors::errors;
 use limits::decide_in_words;
 use logs::{Logs, unused_in_words};
 use next::{Experiment, experiments};
-pub(crate) use pages::{digest, gates_csv, sections, summary};
+pub(crate) use pages::{digest, gates_csv, sections, starts_csv, summary};
 use recording::{HeldOut, Recording};
 use remarks::remarks;
 
@@ -119,6 +119,7 @@ impl Trace {
         };
         interrupt::check()?;
         let mut named = named?;
+        traced.keep_what_was_added(session, cache);
         named.answer = named.answer.unless_stalls(recordings[0].config.slip.level);
         progress.message("simulating the error before and after");
         let errors = errors(&recordings, &named.answer, held_out, seed)?;

@@ -1,10 +1,11 @@
 //! The pictures of a trace.
 
-use chart::{Axis, Color, Dash, Figure, Interval, Mark, Shape, Style};
-use diagnose::{MeanLaps, mean_lap};
+use chart::{Axis, Color, Dash, Direction, Figure, Interval, Mark, Panel, Shape, Style};
+use diagnose::{MeanBeginning, MeanLaps, mean_lap};
 use track::Lap;
 
 use super::Trace;
+use super::errors::Starts;
 use super::recording::Recording;
 use crate::figures::{MM, across, colored_path, crossings, line, map, single, walls};
 use crate::laps::SampledRun;
@@ -86,6 +87,40 @@ pub(super) fn mean_laps(trace: &Trace) -> Figure {
         panels: vec![above, below],
         ..Figure::default()
     }
+}
+
+/// How runs start.
+pub(super) fn starts(starts: &Starts) -> Figure {
+    let points = |of: &MeanBeginning| of.ahead_mm().map(|(time_s, mm)| [time_s, mm]).collect::<Vec<_>>();
+    let [.., chance_mm] = starts.errors_mm();
+    let measured = points(&starts.measured);
+    let bar = |&[at, mm]: &[f64; 2]| Interval {
+        at,
+        low: mm - 1.96 * chance_mm,
+        high: mm + 1.96 * chance_mm,
+    };
+    let bars = Shape::ErrorBars {
+        intervals: measured.iter().map(bar).collect(),
+        direction: Direction::Vertical,
+    };
+    let simulated = |label: &str, of: &MeanBeginning, color, dash| {
+        Mark::new(label, line(color, dash, 1.6), Shape::Line(points(of)))
+    };
+    let style = Style::color(Color::INK);
+    let panel = Panel {
+        x: Axis::linear("time since the run began, s"),
+        y: Axis::linear("ahead of steady motion, mm"),
+        marks: vec![
+            simulated("declared model", &starts.before, Color::VERMILLION, Dash::Dashed),
+            simulated("with the answer", &starts.after, Color::BLUE, Dash::Solid),
+            Mark::new("measured", style, bars),
+            Mark::new("measured", style, Shape::Points(measured)),
+        ],
+        ..Panel::default()
+    };
+    let description =
+        "How far the robot is ahead of steady motion: measured, declared model, with the answer.";
+    single("How runs start", description, panel)
 }
 
 /// Laps before and after over measured ones.

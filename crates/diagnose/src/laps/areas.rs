@@ -62,7 +62,7 @@ impl Trial<'_> {
     fn screen_areas(&self, residual: &White, places: &[Vec2]) -> Vec<(f64, Hypothesis)> {
         /// Steps of a target at which it is simulated.
         const STEPS: f64 = 3.0;
-        let (declared, probes) = (self.atlas.declared_mean(0..1), &self.atlas.probes);
+        let probes = &self.atlas.probes;
         let price = price(BELL + 1, self.atlas.layout.total_laps()) + (places.len() as f64).ln();
         let at = |probe: usize, place: Vec2, steps: f64| {
             let per_m = 1.0 / probes[probe].free[1].1;
@@ -72,8 +72,8 @@ impl Trial<'_> {
         let best_of_target = |probe: usize| {
             let about = |place: &Vec2| {
                 let simulated = at(probe, *place, STEPS).settings(self.atlas);
-                let found = self.simulated_plainly(&simulated, 0..1)?;
-                let (multiple, gain) = solve(&[&self.atlas.white(&found, &declared)], residual);
+                let action = self.kept_action(&simulated, 0)?;
+                let (multiple, gain) = solve(&[&action], residual);
                 Some((gain - price, at(probe, *place, STEPS * multiple[0])))
             };
             let about_each: Vec<_> = places.par_iter().filter_map(about).collect();

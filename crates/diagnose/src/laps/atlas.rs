@@ -1,5 +1,6 @@
 //! What the declared model leads one to expect, and how every probe changes it.
 
+use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -10,6 +11,7 @@ use sim::Setting;
 
 use super::expectation::{Expectation, Scatter};
 use super::hypothesis::Hypothesis;
+use super::kept::{Action, Kept};
 use super::layout::Layout;
 use super::observed::ObservedRun;
 use super::probe::{Probe, probes};
@@ -52,6 +54,8 @@ pub struct Atlas {
     pub(super) paths: Vec<Vec<Option<White>>>,
     /// How laps of the declared model ripple.
     pub(super) ripples: Ripples,
+    /// What screens asked for.
+    pub(super) kept: Kept,
     pub(super) spent: Spent,
 }
 
@@ -78,7 +82,7 @@ impl Clone for Spent {
 impl Atlas {
     /// Changes whenever the numbers of an atlas of the same model mean something else: atlases of another recipe are not to be
     /// read.
-    pub const RECIPE: u32 = 7;
+    pub const RECIPE: u32 = 8;
 
     /// Simulates everything for one recording; `cuts` simulate the declared model with walls that another program may have
     /// cut, which is no departure from it; `alike` says whether the declared model does the same in every run, whose physics steps
@@ -147,6 +151,7 @@ impl Atlas {
             probes,
             paths: Vec::new(),
             ripples: Ripples::default(),
+            kept: Kept::default(),
             spent: Spent::default(),
         };
         drop(null);
@@ -166,7 +171,7 @@ impl Atlas {
             .map(|&(p, k)| {
                 let probe = &self.probes[p];
                 let setting = [probe.setting(probe.sizes[k])];
-                let found = self.simulated(simulate, &setting, PATH_SETS)?;
+                let found = self.simulated(simulate, &setting, PATH_SETS, &self.spent)?;
                 Some(self.white(&found.expectation, &self.null))
             })
             .collect();
@@ -177,7 +182,10 @@ impl Atlas {
     }
 
     /// The atlas of several recordings together, from those of each.
-    pub fn join(parts: Vec<Self>) -> Option<Self> {
+    pub fn join(mut parts: Vec<Self>) -> Option<Self> {
+        if parts.len() == 1 {
+            return parts.pop();
+        }
         let probes = parts.first()?.probes.clone();
         let samples = (0..NULL_SETS as usize)
             .map(|set| Expectation::join(parts.iter().map(|part| part.samples[set].clone())))
@@ -193,8 +201,14 @@ impl Atlas {
             paths: paths.collect(),
             ripples: Ripples::join(&parts.iter().map(|part| &part.ripples).collect::<Vec<_>>()),
             probes,
+            kept: Kept::default(),
             spent: Spent::default(),
         })
+    }
+
+    /// Whether a diagnosis simulated what another of the same model would ask for again: worth keeping the atlas anew.
+    pub fn has_grown(&self) -> bool {
+        self.kept.has_grown()
     }
 
     /// The atlas as bytes, for a cache.
@@ -208,6 +222,7 @@ impl Atlas {
             layout: self.layout.clone(),
             paths: self.paths.clone(),
             ripples: self.ripples.clone(),
+            kept: self.kept.to_map(),
         })
         .expect("numbers and lists have a form as bytes")
     }
@@ -223,6 +238,7 @@ impl Atlas {
             layout,
             paths,
             ripples,
+            kept,
         } = postcard::from_bytes(bytes).ok()?;
         let probes = if made_with.is_empty() {
             Vec::new()
@@ -238,6 +254,7 @@ impl Atlas {
             probes,
             paths,
             ripples,
+            kept: Kept::of(kept),
             spent: Spent::default(),
         })
     }
@@ -355,6 +372,7 @@ struct Stored {
     layout: Layout,
     paths: Vec<Vec<Option<White>>>,
     ripples: Ripples,
+    kept: BTreeMap<String, Action>,
 }
 
 /// What tells two lists of probes apart.

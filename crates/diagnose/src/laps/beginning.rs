@@ -100,6 +100,12 @@ impl MeanBeginning {
         })
     }
 
+    /// How far the robot is ahead of steady motion, mm, and when, in s since the start of its run.
+    pub fn ahead_mm(&self) -> impl Iterator<Item = (f64, f64)> {
+        let ahead_mm = self.ahead_mm.into_iter().enumerate();
+        ahead_mm.map(|(bin, mm)| (BIN_S * bin as f64, mm))
+    }
+
     /// How far the robot is from where it is in others at the same time since the start: root mean square over four times, mm.
     pub fn distance_mm(&self, other: &Self) -> f64 {
         let pairs = self.ahead_mm.iter().zip(&other.ahead_mm);
@@ -184,6 +190,8 @@ mod tests {
         );
         let (near, far) = (near.unwrap(), far.unwrap());
         assert_eq!(near.distance_mm(&far), 3.0);
+        let ahead_mm: Vec<(f64, f64)> = near.ahead_mm().take(2).collect();
+        assert_eq!(ahead_mm, [(0.0, 2.0), (0.064, 0.0)]);
         // A variance of 2 in one number of four.
         assert!((near.chance_mm(&far) - 0.5_f64.sqrt()).abs() < 1e-12);
         assert_eq!(MeanBeginning::of(&[]), None);

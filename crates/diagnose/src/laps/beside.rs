@@ -96,14 +96,16 @@ impl Trial<'_> {
     /// What an expectation leaves of the data, in units of a base's scatter, but for what the base's numbers can follow.
     pub(super) fn left_beyond(&self, base: &Base, expected: &Expectation) -> White {
         let scatter = base.scatter.as_ref().unwrap_or(&self.atlas.scatter);
-        let without_silent = |mut left: White| {
-            for range in self.silent {
-                left.rows_mut(range.start, range.len()).fill(0.0);
-            }
-            left
-        };
         let left = white(scatter, &self.atlas.layout, self.data, expected);
-        without_silent(base.beyond(without_silent(left)))
+        self.without_silent(base.beyond(self.without_silent(left)))
+    }
+
+    /// What is left where entries have a say.
+    pub(super) fn without_silent(&self, mut left: White) -> White {
+        for range in self.silent {
+            left.rows_mut(range.start, range.len()).fill(0.0);
+        }
+        left
     }
 
     /// What some simulated data sets leave of the data with further settings beside a base; see [`Trial::left_beyond`]. `None`

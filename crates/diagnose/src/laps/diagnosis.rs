@@ -59,6 +59,7 @@ impl Atlas {
             simulate,
             data: &data,
             silent: &[],
+            spent: &self.spent,
         };
         let search = Search {
             trial,
@@ -331,6 +332,7 @@ impl Atlas {
             simulate,
             data: &data,
             silent: &[],
+            spent: &self.spent,
         };
         let after = trial.remainder(effects);
         Ok((

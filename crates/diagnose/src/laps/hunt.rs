@@ -226,6 +226,35 @@ impl Trial<'_> {
         };
         sizes.par_iter().filter_map(look).collect()
     }
+
+    /// The same beside nothing, at sizes that are asked for whatever the data are.
+    pub(super) fn kept_looks(
+        &self,
+        nothing: &Base,
+        probe: usize,
+        sizes: &[f64],
+        sets: &[Range<u64>; 2],
+    ) -> Vec<Look> {
+        let before = self.left_beyond(nothing, &self.atlas.null);
+        let look = |&size: &f64| {
+            let setting = [self.atlas.probes[probe].setting(size)];
+            let left = |sets: &Range<u64>| {
+                let change = self.kept_change(&setting, sets.clone())?;
+                Some(self.without_silent(&before - change))
+            };
+            let first = left(&sets[0])?;
+            let second = if sets[0] == sets[1] {
+                first.clone()
+            } else {
+                left(&sets[1])?
+            };
+            Some(Look {
+                size,
+                left: [first, second],
+            })
+        };
+        sizes.par_iter().filter_map(look).collect()
+    }
 }
 
 impl Atlas {

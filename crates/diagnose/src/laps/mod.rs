@@ -13,6 +13,7 @@ mod unseen;
 mod areas;
 mod atlas;
 mod hypothesis;
+mod kept;
 mod likelihood;
 mod memo;
 mod part;

@@ -135,7 +135,7 @@ impl Trial<'_> {
         if others.parts.is_empty() {
             return self.ripple_beyond(runs, &self.atlas.ripples);
         }
-        self.atlas.spent.add(SETS + wheel_sets(&self.atlas.probes));
+        self.spent.add(SETS + wheel_sets(&self.atlas.probes));
         let round = powers(self.simulate, &others.settings(self.atlas), SETS)?;
         self.ripple_beyond(runs, &self.atlas.ripples(self.simulate, others, round))
     }

@@ -100,11 +100,16 @@ impl Trial<'_> {
         };
         let sizes = &self.atlas.probes[probe].sizes;
         let (ratio, sizes) = in_constant_ratio(sizes[0], sizes[sizes.len() - 1], count);
+        let looks = if base.hypothesis.parts.is_empty() {
+            self.kept_looks(base, probe, &sizes, &sets)
+        } else {
+            self.looks(base, probe, &sizes, &sets)
+        };
         Some(Scan {
             probe,
             ratio,
             excess,
-            looks: self.looks(base, probe, &sizes, &sets),
+            looks,
         })
     }
 

@@ -16,7 +16,9 @@ use super::pairs::ScreenedPair;
 use super::part::{Freedom, Shape};
 use super::refine::{Descent, Settled};
 use super::ripple::Ripple;
-use super::rounds::{ROUNDS, ROUNDS_FROM_NEAR, ROUNDS_OF_GROUPS, ROUNDS_OF_SEVERAL, Rung, best_of, near};
+use super::rounds::{
+    ROUNDS, ROUNDS_BESIDE, ROUNDS_FROM_NEAR, ROUNDS_OF_GROUPS, ROUNDS_OF_SEVERAL, Rung, best_of, near,
+};
 use super::scans::Scan;
 use super::tests_of_fit::{Departures, Quadratic, SIGNIFICANT_P};
 use super::trial::Trial;
@@ -203,7 +205,7 @@ impl Search<'_> {
             let further = self.beside(&base, left, &starts);
             starts.extend(further);
         }
-        self.settle(self.descend_several(&starts, &ROUNDS_OF_SEVERAL, f64::NEG_INFINITY))
+        self.settle(self.descend_several(&starts, &ROUNDS_BESIDE, f64::NEG_INFINITY))
     }
 
     /// Descends from hypotheses of several effects; the best one is tried without its patterns too, one of them or all, and with

@@ -5,7 +5,7 @@ use std::ops::Range;
 use rayon::prelude::*;
 use sim::Setting;
 
-use super::atlas::{Atlas, Simulate, White};
+use super::atlas::{Atlas, Simulate, Spent, White};
 use super::expectation::Expectation;
 use super::hypothesis::Hypothesis;
 use super::likelihood::Doubt;
@@ -45,20 +45,20 @@ impl Control {
 impl Trial<'_> {
     /// What one step of each of these numbers of probes does, by the same draws; `None` where the robot crashes.
     pub(super) fn actions(&self, numbers: &[(usize, usize)], sets: u64) -> Vec<Option<White>> {
-        let same_draws = self.atlas.declared_mean(0..sets);
         numbers
             .par_iter()
             .map(|&(probe, number)| {
-                let setting = [self.atlas.probes[probe].step(number)];
-                let found = self.simulated_plainly(&setting, 0..sets)?;
-                Some(self.atlas.white(&found, &same_draws))
+                let step = [self.atlas.probes[probe].step(number)];
+                let actions = (0..sets).map(|set| self.kept_action(&step, set));
+                let sum = actions.reduce(|sum, action| Some(sum? + action?)).flatten()?;
+                Some(sum / sets as f64)
             })
             .collect()
     }
 
     /// The mean of data sets simulated with these settings, without the control variate of [`Trial::evaluate`].
     pub(super) fn simulated_plainly(&self, settings: &[Setting], sets: Range<u64>) -> Option<Expectation> {
-        let summaries = self.atlas.summaries(self.simulate, settings, sets)?;
+        let summaries = self.summaries(settings, sets)?;
         Some(Expectation::of(summaries.iter(), self.atlas.alike))
     }
 
@@ -72,9 +72,7 @@ impl Trial<'_> {
         if all < fewest {
             return self.simulated_plainly(settings, sets);
         }
-        let summaries = self
-            .atlas
-            .summaries(self.simulate, settings, sets.start..sets.start + fewest)?;
+        let summaries = self.summaries(settings, sets.start..sets.start + fewest)?;
         let first = self.atlas.paired(summaries, sets.start, alike);
         let of_one = first.doubt.error * fewest as f64;
         let enough = ((of_one * all as f64).round() as u64).clamp(fewest, all);
@@ -82,11 +80,7 @@ impl Trial<'_> {
             return Some(first.expectation);
         }
         let mut summaries = first.summaries;
-        summaries.extend(self.atlas.summaries(
-            self.simulate,
-            settings,
-            sets.start + fewest..sets.start + enough,
-        )?);
+        summaries.extend(self.summaries(settings, sets.start + fewest..sets.start + enough)?);
         Some(self.atlas.paired(summaries, sets.start, alike).expectation)
     }
 
@@ -96,7 +90,7 @@ impl Trial<'_> {
         /// Share of the data sets that must be whole.
         const ENOUGH: f64 = 0.75;
         let sets = self.atlas.enough(FINAL_SETS, 1);
-        self.atlas.spent.add(sets);
+        self.spent.add(sets);
         let found: Vec<(Summary, &Expectation)> = (0..sets)
             .into_par_iter()
             .filter_map(|set| {
@@ -118,8 +112,8 @@ impl Trial<'_> {
 
     /// A hypothesis simulated; `None` where the robot crashes.
     pub(super) fn evaluate(&self, hypothesis: &Hypothesis, sets: u64) -> Option<Evaluated> {
-        self.atlas
-            .simulated(self.simulate, &hypothesis.settings(self.atlas), sets)
+        let settings = hypothesis.settings(self.atlas);
+        self.atlas.simulated(self.simulate, &settings, sets, self.spent)
     }
 
     /// The same with data sets added until there are so many.
@@ -131,12 +125,12 @@ impl Trial<'_> {
     ) -> Option<Evaluated> {
         let mut summaries = evaluated.summaries;
         let done = summaries.len() as u64;
-        summaries.extend(self.atlas.summaries(
-            self.simulate,
-            &hypothesis.settings(self.atlas),
-            done..sets.max(done),
-        )?);
+        summaries.extend(self.summaries(&hypothesis.settings(self.atlas), done..sets.max(done))?);
         Some(self.atlas.paired(summaries, 0, evaluated.doubt.alike))
+    }
+
+    fn summaries(&self, settings: &[Setting], sets: Range<u64>) -> Option<Vec<Summary>> {
+        self.atlas.summaries(self.simulate, settings, sets, self.spent)
     }
 }
 
@@ -152,14 +146,15 @@ impl Atlas {
         sets.max(needed.div_ceil(points)).min(self.samples.len() as u64)
     }
 
-    /// Settings simulated with so many data sets; `None` where the robot crashes.
+    /// Settings simulated with so many data sets, which count as spent; `None` where the robot crashes.
     pub(super) fn simulated(
         &self,
         simulate: &Simulate<'_>,
         settings: &[Setting],
         sets: u64,
+        spent: &Spent,
     ) -> Option<Evaluated> {
-        let summaries = self.summaries(simulate, settings, 0..sets)?;
+        let summaries = self.summaries(simulate, settings, 0..sets, spent)?;
         Some(self.paired(summaries, 0, self.are_alike(settings)))
     }
 
@@ -168,8 +163,9 @@ impl Atlas {
         simulate: &Simulate<'_>,
         settings: &[Setting],
         sets: Range<u64>,
+        spent: &Spent,
     ) -> Option<Vec<Summary>> {
-        self.spent.add(sets.end - sets.start);
+        spent.add(sets.end - sets.start);
         sets.into_par_iter()
             .map(|set| self.summary(simulate, settings, set))
             .collect()

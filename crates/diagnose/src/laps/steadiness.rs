@@ -47,7 +47,7 @@ impl Trial<'_> {
     pub(super) fn settling(&self, runs: &Runs, hypothesis: &Hypothesis, part: usize) -> Option<Settling> {
         let settings = hypothesis.settings(self.atlas);
         let others = hypothesis.without(part).settings(self.atlas);
-        self.atlas.spent.add(SETS);
+        self.spent.add(SETS);
         let with: Vec<Vec<ObservedRun>> = (0..SETS)
             .into_par_iter()
             .map(|set| (self.simulate)(&settings, set))

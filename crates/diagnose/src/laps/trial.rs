@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::atlas::{Atlas, Simulate};
+use super::atlas::{Atlas, Simulate, Spent};
 use super::expectation::Expectation;
 
 /// The declared model, with whatever effects are added to it, simulated and held against one data set.
@@ -13,4 +13,6 @@ pub(super) struct Trial<'a> {
     pub(super) data: &'a Expectation,
     /// Entries that have no say in sizes.
     pub(super) silent: &'a [Range<usize>],
+    /// Where simulated data sets are counted.
+    pub(super) spent: &'a Spent,
 }

@@ -1,8 +1,11 @@
 //! Effects on readings: gains, offsets, crosstalk, lag, noise and rounding.
 
+use track::Vec2;
+
 use super::plain::{OnMachine, OnReadings};
 use super::{AZIMUTH, Effect, Hook, Moment, Param, Spec, Stage};
-use crate::{Machine, Readings};
+use crate::cast::LANES;
+use crate::{Machine, Mount, Readings};
 
 /// Which of S0 to S7.
 const SENSOR: Param = Param::number_of("sensor", 8);
@@ -85,20 +88,29 @@ pub(super) const DIRECTIONAL_LIGHT: Spec = Spec {
     summary: "light from far away: adds counts * max(0, cos(ray direction - azimuth)), before noise",
     params: &[Param::new("counts", "counts", 0.0, 0.0, 4000.0), AZIMUTH],
     list: None,
-    build: || Box::new(DirectionalLight),
+    build: || Box::new(DirectionalLight::default()),
 };
 
-#[derive(Debug)]
-struct DirectionalLight;
+/// Remembers where the sensors look, in the body frame: they stay where they are, while the light turns about the robot.
+#[derive(Debug, Default)]
+struct DirectionalLight {
+    mounts: Option<[Mount; LANES]>,
+    axes: [Vec2; LANES],
+}
 
 impl Effect for DirectionalLight {
     fn hooks(&self) -> &'static [Hook] {
         &[Hook::Readings]
     }
     fn readings(&mut self, values: &[f64], now: &Moment, machine: &Machine, readings: &mut Readings) {
-        let azimuth_rad = values[1] - now.pose.heading_rad(); // in the body frame
-        for (reading, mount) in readings.iter_mut().zip(&machine.mounts) {
-            *reading += values[0] * (mount.angle_rad - azimuth_rad).cos().max(0.0);
+        if self.mounts != Some(machine.mounts) {
+            self.mounts = Some(machine.mounts);
+            self.axes = machine.mounts.map(|mount| Vec2::from_angle(mount.angle_rad));
+        }
+        let (light, heading) = (Vec2::from_angle(values[1]), now.pose.heading);
+        let light = Vec2::new(heading.dot(light), heading.perp_dot(light)); // in the body frame
+        for (reading, axis) in readings.iter_mut().zip(self.axes) {
+            *reading += values[0] * axis.dot(light).max(0.0);
         }
     }
 }
