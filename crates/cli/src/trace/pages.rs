@@ -1,7 +1,7 @@
 //! A trace as a colleague would write it: sections of a report.
 
 use anyhow::Result;
-use diagnose::{Candidate, Cause, Decided, Departures, Explanation, MeanLaps, Quadratic, Verdict, mean_lap};
+use diagnose::{Candidate, Cause, Decided, Departures, Explanation, MeanLaps, Quadratic, Verdict};
 use sim::Pattern;
 
 use super::answer::rivals;
@@ -144,36 +144,6 @@ fn unexplained(trace: &Trace) -> String {
         "Unexplained: the data depart from the declared model, and no effect in the registry explains it. No name would be honest.{}",
         known.unwrap_or_default()
     )
-}
-
-/// The mean laps gate by gate as CSV, recording by recording.
-pub(crate) fn gates_csv(trace: &Trace) -> String {
-    let mut csv = String::from("data_set,gate,measured_m,before_m,after_m\n");
-    for errors in &trace.errors {
-        let laps: Vec<Vec<f64>> = errors.held_out.iter().flat_map(SampledRun::offsets_m).collect();
-        let name = errors.held_out.first().map_or("", SampledRun::set);
-        for (gate, measured) in mean_lap(&laps).unwrap_or_default().iter().enumerate() {
-            let (before, after) = (errors.before.mean_m()[gate], errors.after.mean_m()[gate]);
-            csv += &format!("{name},{gate},{measured:.6},{before:.6},{after:.6}\n");
-        }
-    }
-    csv
-}
-
-/// How runs start as CSV, recording by recording where that is known.
-pub(crate) fn starts_csv(trace: &Trace) -> String {
-    let mut csv = String::from("data_set,t_s,measured_mm,before_mm,after_mm\n");
-    for errors in &trace.errors {
-        let name = errors.held_out.first().map_or("", SampledRun::set);
-        let Some(starts) = &errors.starts else {
-            continue;
-        };
-        let simulated = starts.before.ahead_mm().zip(starts.after.ahead_mm());
-        for ((time_s, measured), ((_, before), (_, after))) in starts.measured.ahead_mm().zip(simulated) {
-            csv += &format!("{name},{time_s:.3},{measured:.3},{before:.3},{after:.3}\n");
-        }
-    }
-    csv
 }
 
 /// Effects with their sizes, one by one, for a sentence.
@@ -431,7 +401,9 @@ fn before_and_after(trace: &Trace) -> Vec<Block> {
             "starts",
             "Fig. D",
             format!(
-                "How runs start: how far the robot is ahead of where it would be had it always been as fast as in the second after, on                  average over the runs. A robot that sets off late was ahead for good; of the bars 95 in 100 reach the truth.{of}"
+                "How runs start: how far the robot is ahead of where it would be had it always been as fast as in the second after, on \
+                 average over the runs. One that sets off late is ahead at first, for it then falls behind. Where the answer is right, 95 of \
+                 100 bars reach its line.{of}"
             ),
             pictures::starts(starts),
         ));
