@@ -208,10 +208,7 @@ impl Trial<'_> {
     fn look_around(&self, descent: Descent, round: Round) -> Option<Descent> {
         let full = round == Round::Full;
         let points = 2 * descent.freedoms.len() as u64 + 1;
-        // Far from the data what is wrong with the hypothesis matters more than noise.
-        let is_far = descent.leaves_far_too_much();
-        let looked = if is_far { Round::Again } else { round };
-        let sets = self.atlas.enough(looked.sets_around(points), points);
+        let sets = self.atlas.enough(round.sets_around(points), points);
         let mut local = self.local(&descent.hypothesis, &descent.freedoms, sets)?;
         let Descent {
             hypothesis, freedoms, ..
@@ -245,7 +242,7 @@ impl Trial<'_> {
         };
         let Nearest { moves, errors, .. } = nearest;
         let hypothesis = self.atlas.with_moves(&hypothesis, &freedoms, &moves);
-        let found = full && !is_far && is_settled(&moves, &nearest.covariance, &freedoms);
+        let found = full && is_settled(&moves, &nearest.covariance, &freedoms);
         let holds = are_within_steps(&moves, &freedoms);
         let remainder = full.then(|| Departures::new(&nearest.fit.residual, &self.atlas.layout));
         for (i, freedom) in freedoms.iter_mut().enumerate() {
