@@ -144,9 +144,7 @@ fn on_walls(settings: &[Setting], run: usize) -> Result<Vec<Active>, Error> {
 
 /// The beam of all sensors, ray by ray.
 fn sights(machine: &Machine) -> Vec<Sight> {
-    let axes = machine
-        .mounts
-        .map(|mount| Vec2::new(mount.angle_rad.cos(), mount.angle_rad.sin()));
+    let axes = machine.mounts.map(|mount| mount.axis());
     let sight = |&(turn, weight): &(Vec2, f64)| Sight {
         rays: Rays::new(std::array::from_fn(|i| {
             (machine.mounts[i].position, axes[i].rotate(turn))

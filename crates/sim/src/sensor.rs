@@ -17,6 +17,13 @@ pub struct Mount {
     pub angle_rad: f64,
 }
 
+impl Mount {
+    /// Unit vector along its ray, in the body frame.
+    pub(crate) fn axis(&self) -> Vec2 {
+        Vec2::new(self.angle_rad.cos(), self.angle_rad.sin())
+    }
+}
+
 /// Reading against distance, before noise.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Response {

@@ -7,7 +7,7 @@ use diagnose::{
 };
 use sim::{Pattern, Setting, Vec2};
 
-use super::atlas::{Purpose, atlas, keep_what_was_added};
+use super::atlas::{Purpose, atlas};
 use super::cache::Cache;
 use super::logs::Logs;
 use super::recording::{Recording, Seeds, observed_runs, simulate_all};
@@ -26,7 +26,8 @@ pub(crate) struct FromLogs {
 /// The laps of some recordings, and what the declared model leads one to expect of them.
 pub(super) struct TracedLaps<'a> {
     pub(super) atlas: Atlas,
-    purpose: Purpose,
+    /// Of what the cache holds of it.
+    key: Option<String>,
     recordings: Vec<&'a Recording>,
     runs: Vec<ObservedRun>,
     seed: u64,
@@ -50,18 +51,23 @@ impl<'a> TracedLaps<'a> {
         purpose: Purpose,
         cache: &Cache,
     ) -> Result<Self> {
+        let runs = observed_runs(&recordings)?;
+        let (atlas, key) = atlas(session, &recordings, purpose, cache)?;
         Ok(Self {
-            runs: observed_runs(&recordings)?,
-            atlas: atlas(session, &recordings, purpose, cache)?,
-            purpose,
+            runs,
+            atlas,
+            key,
             recordings,
             seed: session.seed(),
         })
     }
 
     /// Keeps the signatures that the diagnosis has added.
-    pub(super) fn keep_what_was_added(&self, session: &Session, cache: &Cache) {
-        keep_what_was_added(session, &self.atlas, &self.recordings, self.purpose, cache);
+    pub(super) fn keep_what_was_added(&self, cache: &Cache) {
+        if let Some(key) = self.key.as_ref().filter(|_| self.atlas.has_grown()) {
+            // That it cannot be kept was said when it was made.
+            let _ = cache.put(key, &self.atlas);
+        }
     }
 
     fn simulate(&self, effects: &[Setting], set: u64) -> Option<Vec<ObservedRun>> {

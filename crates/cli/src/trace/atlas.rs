@@ -54,38 +54,31 @@ impl Purpose {
     }
 }
 
-/// The atlas of some recordings together.
+/// The atlas of some recordings together, and of one alone the key of what the cache holds of it.
 pub(super) fn atlas(
     session: &Session,
     recordings: &[&Recording],
     purpose: Purpose,
     cache: &Cache,
-) -> Result<Atlas> {
+) -> Result<(Atlas, Option<String>)> {
     let physics_step_s = recordings[0].setup.model.run.physics_step_s();
     let of = |recording: &&Recording| atlas_of(session, recording, (purpose, physics_step_s), cache);
     let parts = recordings.iter().map(of).collect::<Result<Vec<_>>>()?;
-    Ok(Atlas::join(parts).expect("at least one data set is measured"))
+    let (parts, mut keys): (Vec<Atlas>, Vec<String>) = parts.into_iter().unzip();
+    let atlas = Atlas::join(parts).expect("at least one data set is measured");
+    Ok((atlas, keys.pop().filter(|_| keys.is_empty())))
 }
 
-/// Keeps the atlas of some recordings anew if a diagnosis has added to it: of one recording, whose it then is.
-pub(super) fn keep_what_was_added(
+/// A recording's atlas, from the cache or made now, and its key there; delays in it come in steps that all recordings share.
+fn atlas_of(
     session: &Session,
-    atlas: &Atlas,
-    recordings: &[&Recording],
-    purpose: Purpose,
+    recording: &Recording,
+    (purpose, physics_step_s): (Purpose, f64),
     cache: &Cache,
-) {
-    if let ([recording], true) = (recordings, atlas.has_grown()) {
-        let physics_step_s = recording.setup.model.run.physics_step_s();
-        // That it cannot be kept was said when it was made.
-        let _ = cache.put(&key_of(session, recording, purpose, physics_step_s), atlas);
-    }
-}
-
-/// What decides the contents of a recording's atlas.
-fn key_of(session: &Session, recording: &Recording, purpose: Purpose, physics_step_s: f64) -> String {
+) -> Result<(Atlas, String)> {
     let Recording { config, world, .. } = recording;
     let shape = recording.shape();
+    let alike = recording.expects_the_same_of_runs();
     let mut key = format!(
         "{}\n{purpose:?}\n{}\n{world}\n{shape:?}\n{}",
         Atlas::RECIPE,
@@ -95,7 +88,7 @@ fn key_of(session: &Session, recording: &Recording, purpose: Purpose, physics_st
     if let Some(unit_m) = recording.written_m {
         key += &format!("\npositions in {unit_m} m");
     }
-    if !recording.expects_the_same_of_runs() {
+    if !alike {
         key += &format!("\n{:?}", recording.places(&[]));
     }
     if let Some(begin) = recording.beginnings.unknown() {
@@ -104,20 +97,8 @@ fn key_of(session: &Session, recording: &Recording, purpose: Purpose, physics_st
     if physics_step_s != recording.setup.model.run.physics_step_s() {
         key += &format!("\ndelays in {physics_step_s} s");
     }
-    key
-}
-
-/// A recording's atlas, from the cache or made now; delays in it come in steps that all recordings share.
-fn atlas_of(
-    session: &Session,
-    recording: &Recording,
-    (purpose, physics_step_s): (Purpose, f64),
-    cache: &Cache,
-) -> Result<Atlas> {
-    let key = key_of(session, recording, purpose, physics_step_s);
-    let alike = recording.expects_the_same_of_runs();
     if let Some(atlas) = cache.get(&key, physics_step_s) {
-        return Ok(atlas);
+        return Ok((atlas, key));
     }
     let doing = match purpose {
         Purpose::Name => "simulating what each effect would do",
@@ -138,5 +119,5 @@ fn atlas_of(
             folder.display()
         ));
     }
-    Ok(atlas)
+    Ok((atlas, key))
 }

@@ -121,7 +121,7 @@ impl Trace {
         };
         interrupt::check()?;
         let mut named = named?;
-        traced.keep_what_was_added(session, cache);
+        traced.keep_what_was_added(cache);
         named.answer = named.answer.unless_stalls(recordings[0].config.slip.level);
         progress.message("simulating the error before and after");
         let errors = errors(&recordings, &named.answer, held_out, seed)?;

@@ -124,13 +124,7 @@ impl Trial<'_> {
         further: &[Setting],
         sets: &[Range<u64>; 2],
     ) -> Option<[White; 2]> {
-        let first = self.left_beside(base, further, sets[0].clone())?;
-        let second = if sets[0] == sets[1] {
-            first.clone()
-        } else {
-            self.left_beside(base, further, sets[1].clone())?
-        };
-        Some([first, second])
+        twice(sets, |sets| self.left_beside(base, further, sets))
     }
 }
 
@@ -279,6 +273,20 @@ impl Search<'_> {
         let own = spec(&screened.hypothesis.parts[0]);
         start.parts.iter().any(|part| spec(part) == own)
     }
+}
+
+/// What two groups of data sets leave, which are looked at once if they are the same.
+pub(super) fn twice(
+    sets: &[Range<u64>; 2],
+    left: impl Fn(Range<u64>) -> Option<White>,
+) -> Option<[White; 2]> {
+    let first = left(sets[0].clone())?;
+    let second = if sets[0] == sets[1] {
+        first.clone()
+    } else {
+        left(sets[1].clone())?
+    };
+    Some([first, second])
 }
 
 /// What one thing leaves less what another does, each by two groups of data sets.

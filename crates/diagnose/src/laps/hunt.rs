@@ -4,9 +4,10 @@ use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
+use sim::Setting;
 
 use super::atlas::{Atlas, White};
-use super::beside::Base;
+use super::beside::{Base, twice};
 use super::hypothesis::Hypothesis;
 use super::part::Part;
 use super::simulated::FINAL_SETS;
@@ -219,12 +220,7 @@ impl Trial<'_> {
         sizes: &[f64],
         sets: &[Range<u64>; 2],
     ) -> Vec<Look> {
-        let look = |&size: &f64| {
-            let further = [self.atlas.probes[probe].setting(size)];
-            let left = self.left_twice(base, &further, sets)?;
-            Some(Look { size, left })
-        };
-        sizes.par_iter().filter_map(look).collect()
+        self.looks_by(probe, sizes, |further| self.left_twice(base, further, sets))
     }
 
     /// The same beside nothing, at sizes that are asked for whatever the data are.
@@ -236,22 +232,23 @@ impl Trial<'_> {
         sets: &[Range<u64>; 2],
     ) -> Vec<Look> {
         let before = self.left_beyond(nothing, &self.atlas.null);
-        let look = |&size: &f64| {
-            let setting = [self.atlas.probes[probe].setting(size)];
-            let left = |sets: &Range<u64>| {
-                let change = self.kept_change(&setting, sets.clone())?;
+        self.looks_by(probe, sizes, |further| {
+            twice(sets, |sets| {
+                let change = self.kept_change(further, sets)?;
                 Some(self.without_silent(&before - change))
-            };
-            let first = left(&sets[0])?;
-            let second = if sets[0] == sets[1] {
-                first.clone()
-            } else {
-                left(&sets[1])?
-            };
-            Some(Look {
-                size,
-                left: [first, second],
             })
+        })
+    }
+
+    fn looks_by(
+        &self,
+        probe: usize,
+        sizes: &[f64],
+        left: impl Fn(&[Setting]) -> Option<[White; 2]> + Sync,
+    ) -> Vec<Look> {
+        let look = |&size: &f64| {
+            let left = left(&[self.atlas.probes[probe].setting(size)])?;
+            Some(Look { size, left })
         };
         sizes.par_iter().filter_map(look).collect()
     }

@@ -105,7 +105,7 @@ impl Effect for DirectionalLight {
     fn readings(&mut self, values: &[f64], now: &Moment, machine: &Machine, readings: &mut Readings) {
         if self.mounts != Some(machine.mounts) {
             self.mounts = Some(machine.mounts);
-            self.axes = machine.mounts.map(|mount| Vec2::from_angle(mount.angle_rad));
+            self.axes = machine.mounts.map(|mount| mount.axis());
         }
         let (light, heading) = (Vec2::from_angle(values[1]), now.pose.heading);
         let light = Vec2::new(heading.dot(light), heading.perp_dot(light)); // in the body frame
