@@ -339,6 +339,24 @@ fn a_rounding_of_readings_is_found_beside_a_gain_that_hides_its_size() {
 }
 
 #[test]
+fn a_rounding_is_found_beside_another_one() {
+    const COUNTS: f64 = 54.01;
+    const SPEED_M_S: f64 = 0.018657;
+    let mut robot = Robot::with(Setting::constant(sim::find("speed-step").unwrap(), [SPEED_M_S]));
+    robot
+        .effects
+        .push(Setting::constant(sim::find("reading-step").unwrap(), [COUNTS]));
+    let found = by_laps(&robot);
+    says(&found, "explained", &["speed-step", "reading-step"]);
+    for (effect, truth) in [(0, SPEED_M_S), (1, COUNTS)] {
+        let size = found["effects"][effect]["parameters"][0]["value"]
+            .as_f64()
+            .unwrap();
+        assert!((size / truth - 1.0).abs() < 0.015, "{size}, not {truth}");
+    }
+}
+
+#[test]
 fn a_light_that_goes_over_the_runs_is_seen_beside_wheels_that_slip_much() {
     const SLIP: f64 = 4.2;
     const COUNTS: [f64; 4] = [43.7, 17.3, 11.4, 6.9];

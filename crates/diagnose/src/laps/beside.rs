@@ -141,13 +141,16 @@ impl Atlas {
     /// Every probe in every pattern at its size that explains most of what a base leaves, but for what the base's numbers can
     /// follow, best first. What is left is given in units of the declared model's scatter.
     fn screen_beside(&self, base: &Base, left: &White) -> Vec<Screened> {
-        let beyond = |white: &White| {
-            base.beyond(match &base.scatter {
-                Some(own) => in_other_units(white, &self.layout, &self.scatter, own),
-                None => white.clone(),
-            })
-        };
+        let beyond = |white: &White| self.beyond(base, white);
         self.screen_by(&beyond(left), beyond)
+    }
+
+    /// A vector in units of the declared model's scatter in those of a base's, but for what the base's numbers can follow.
+    pub(super) fn beyond(&self, base: &Base, white: &White) -> White {
+        base.beyond(match &base.scatter {
+            Some(own) => in_other_units(white, &self.layout, &self.scatter, own),
+            None => white.clone(),
+        })
     }
 }
 

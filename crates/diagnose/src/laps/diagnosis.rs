@@ -14,9 +14,9 @@ use super::search::{Found, Search, candidates, of_other_effects, sort};
 use super::tests_of_fit::{ALARM_P, Departures};
 use super::trial::Trial;
 use super::verdict::{
-    ALL_BUT_FAULTS, ENOUGH, MOST, goes_over_runs_or_time, hides_what_is_left, is_claimed, is_doubtful,
-    leaves_nothing_to_ask, preferred, stands_alone, suffices, unless_as_good, unless_named, verdict_of,
-    with_first,
+    ALL_BUT, ALL_BUT_FAULTS, ENOUGH, MOST, goes_over_runs_or_time, hides_what_is_left, is_claimed,
+    is_doubtful, leaves_nothing_to_ask, preferred, stands_alone, suffices, unless_as_good, unless_named,
+    verdict_of, with_first,
 };
 use crate::answer::{ALTERNATIVE, indistinguishable};
 use crate::{Answer, Cause, Error, Explanation, Verdict, Watch};
@@ -167,7 +167,7 @@ fn explain(search: &Search<'_>, mut found: Vec<Found>) -> Vec<Found> {
         // What explains most and leaves something lacks a second effect rather than another name.
         let lacks_another =
             best.share > MOST && !jumps && !goes_over_runs_or_time(best) && !hides_what_is_left(best);
-        suffices(best) && !is_doubtful(best, ENOUGH) || lacks_another && !best.fits()
+        suffices(best) && !is_doubtful(best, ALL_BUT) || lacks_another && !best.fits()
     };
     if !first_is(&found, needs_no_scan) {
         let clear = search.clear_pairs();
@@ -211,7 +211,7 @@ fn explain(search: &Search<'_>, mut found: Vec<Found>) -> Vec<Found> {
         let patterns = search.patterns(of_other_effects(several).into_iter().take(PATTERNS_OF_SEVERAL));
         found = preferred(found, patterns);
     }
-    if !first_is(&found, |best| suffices(best) || best.share > MOST) {
+    if !first_is(&found, suffices) {
         let beside = search.scans_beside(&found);
         found = preferred(found, beside);
     }

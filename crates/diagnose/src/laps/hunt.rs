@@ -55,6 +55,10 @@ impl Hunt {
         Self { left, ..self }
     }
 
+    pub(super) fn probe(&self) -> usize {
+        self.probe
+    }
+
     /// Hunts, what leaves least first.
     pub(super) fn least_first(mut hunts: Vec<Self>) -> Vec<Self> {
         hunts.sort_by(|a, b| a.left.total_cmp(&b.left));

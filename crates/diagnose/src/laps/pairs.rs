@@ -11,7 +11,7 @@ use super::refine::Descent;
 use super::rounds::{ROUNDS_BESIDE, ROUNDS_OF_SEVERAL, Rung, best_of};
 use super::screen::{BEYOND, Screened, price, tangent};
 use super::search::{BASES, Found, NEARLY_ALL, STRONG, Search, of_other_effects};
-use super::verdict::{faults_beside, stands_alone};
+use super::verdict::{faults_beside, stands_alone, suffices};
 
 /// A straight piece of a probe's path.
 pub(super) struct Piece {
@@ -21,8 +21,8 @@ pub(super) struct Piece {
     /// Shares of the piece that are allowed.
     low: f64,
     high: f64,
-    from: White,
-    along: White,
+    pub(super) from: White,
+    pub(super) along: White,
     /// Products of the two with themselves and with each other.
     from_square: f64,
     along_square: f64,
@@ -329,7 +329,12 @@ impl Search<'_> {
         );
         let least = FAIR_SHARE * faults;
         let mut tried = Tried::new(&ROUNDS_BESIDE, single.explanation.score + least);
-        if !stands && !single.explanation.fits() {
+        let jumps = self.jumps(&single.hypothesis);
+        let surely_lacks = !suffices(&single.explanation);
+        if jumps && surely_lacks {
+            self.descend_on(&mut tried, self.jumping_beside(found));
+        }
+        if !stands && !single.explanation.fits() && !tried.fits() {
             self.descend_on(&mut tried, self.pairs_about(single));
         }
         if tried.fits() {
@@ -357,6 +362,9 @@ impl Search<'_> {
             return self.pairs_with_first(found);
         }
         self.descend_on(&mut tried, self.beside_of(&heard, &base, &single.left, &[]));
+        if !jumps && surely_lacks && !tried.fits() {
+            self.descend_on(&mut tried, self.jumping_beside(found));
+        }
         self.with_exchanged(tried)
     }
 

@@ -246,9 +246,9 @@ impl Probe {
     }
 }
 
-/// Effects whose action jumps with their size, and the number of sizes to scan: a speed of a dozen steps is rounded otherwise where
-/// a step is half a per cent larger; readings are many, and bands of interest few.
-const JUMPS: [(&str, u32); 3] = [("speed-step", 240), ("dead-band", 60), ("reading-step", 60)];
+/// Effects whose action jumps with their size, and the number of sizes to scan: a speed or a threshold of a dozen steps is rounded
+/// otherwise where a step is half a per cent larger; bands of interest are few.
+const JUMPS: [(&str, u32); 3] = [("speed-step", 240), ("dead-band", 60), ("reading-step", 240)];
 
 /// Sizes of the first parameter of an effect.
 fn line(name: &str, sizes: &[f64]) -> Vec<Probe> {

@@ -1,5 +1,6 @@
 //! Effects whose action jumps with their size, at sizes all over their range: derivatives say nothing of them.
 
+use std::collections::BTreeMap;
 use std::ops::Range;
 
 use nalgebra::DMatrix;
@@ -12,10 +13,12 @@ use super::hunt::{Hunt, Look};
 use super::hypothesis::Hypothesis;
 use super::pairs::{Columns, Piece};
 use super::part::{Part, Shape};
+use super::probe::Probe;
 use super::refine::Descent;
 use super::rounds::{ROUNDS_OF_SEVERAL, near};
-use super::search::{BASES, Found, Search, sort};
+use super::search::{BASES, Found, Search, of_other_effects, sort};
 use super::trial::Trial;
+use super::verdict;
 
 /// Pairs with an effect that jumps that are simulated before the best few are tried.
 const HEARD: usize = 8;
@@ -51,11 +54,6 @@ impl Beside {
 }
 
 impl Scan {
-    /// A hunt from the best size; `None` where no size explains a fair share of what the base leaves.
-    fn best(&self, base: &Base, chance: f64) -> Option<Hunt> {
-        self.bottoms(base, chance).into_iter().next()
-    }
-
     /// Hunts from the best of the sizes that leave less than their neighbours; from none that explain less than a fair share of what
     /// the base leaves.
     fn bottoms(&self, base: &Base, chance: f64) -> Vec<Hunt> {
@@ -79,28 +77,26 @@ impl Scan {
 }
 
 impl Trial<'_> {
-    /// What a probe that jumps leaves beside a base; `None` where the base crashes.
+    /// What a probe that jumps leaves beside a base, at the sizes at which it may explain a fair share of that; `None` where the base
+    /// crashes.
     fn scan(&self, base: &Base, probe: usize) -> Option<Scan> {
         const SETS: u64 = 3;
-        const FEW: u32 = 60;
         /// Excess, in units of what chance leaves, below which noise would hide which size is best.
         const LITTLE: f64 = 3.0;
-        let without = if base.hypothesis.parts.is_empty() {
+        let alone = base.hypothesis.parts.is_empty();
+        let without = if alone {
             self.atlas.null.clone()
         } else {
             self.evaluate(&base.hypothesis, SETS)?.expectation
         };
         let chance = self.atlas.layout.len() as f64;
         let excess = self.left_beyond(base, &without).norm_squared() - chance;
-        // Many sizes with one data set each, or fewer with two pairs of them.
-        let (count, sets) = if excess < LITTLE * chance {
-            (FEW, [0..2, 2..4])
-        } else {
-            (self.atlas.probes[probe].scanned, [0..1, 0..1])
-        };
-        let sizes = &self.atlas.probes[probe].sizes;
-        let (ratio, sizes) = in_constant_ratio(sizes[0], sizes[sizes.len() - 1], count);
-        let looks = if base.hypothesis.parts.is_empty() {
+        let second = if excess < LITTLE * chance { 1..2 } else { 0..1 };
+        let sets = [0..1, second];
+        let Probe { sizes, scanned, .. } = &self.atlas.probes[probe];
+        let (ratio, sizes) = in_constant_ratio(sizes[0], sizes[sizes.len() - 1], *scanned);
+        let sizes = self.may_explain(base, probe, sizes, excess);
+        let looks = if alone {
             self.kept_looks(base, probe, &sizes, &sets)
         } else {
             self.looks(base, probe, &sizes, &sets)
@@ -111,6 +107,20 @@ impl Trial<'_> {
             excess,
             looks,
         })
+    }
+
+    /// The sizes of a probe that jumps at which it may explain a fair share of what a base leaves: it does that much beside nothing, but
+    /// for what the base's numbers follow, or a few times more or less.
+    fn may_explain(&self, base: &Base, probe: usize, sizes: Vec<f64>, excess: f64) -> Vec<f64> {
+        /// Squared actions that may explain it, in units of what the base leaves.
+        const OF_EXCESS: Range<f64> = 0.01..10.0;
+        let may = |&size: &f64| {
+            let setting = self.atlas.probes[probe].setting(size);
+            let action = self.kept_change(&[setting], 0..1);
+            let square = |action: White| self.atlas.beyond(base, &action).norm_squared();
+            action.is_some_and(|action| OF_EXCESS.contains(&(square(action) / excess)))
+        };
+        sizes.into_par_iter().filter(may).collect()
     }
 
     /// A probe that jumps with each of those that do not, at sizes close about the one to which it came alone: the best few. What the
@@ -171,11 +181,18 @@ impl Atlas {
             .collect()
     }
 
-    /// The constant probes that do not jump which explain a residual best beside every scanned one, best first: of a probe that
-    /// jumps few at a size and about it.
+    /// The constant probes that do not jump which explain a residual best beside every scanned one, and better than alone, best first:
+    /// of a probe that jumps few at a size and about it.
     fn screen_beside_scans(&self, residual: &White, scans: &[Scan], most: usize) -> Vec<Beside> {
         let pieces = self.smooth_pieces();
         let Columns { from, along } = Columns::of(&pieces);
+        let mut alone: BTreeMap<usize, f64> = BTreeMap::new();
+        for piece in &pieces {
+            let (gain, _) = piece.best(piece.along.dot(residual), piece.from.dot(residual));
+            let score = self.score_of_constant(piece.probe, 0.5 * gain);
+            let best = alone.entry(piece.probe).or_insert(score);
+            *best = best.max(score);
+        }
         let mut all: Vec<Beside> = Vec::new();
         for scan in scans.iter().filter(|scan| !scan.looks.is_empty()) {
             let left: Vec<White> = scan.looks.iter().map(Look::mean).collect();
@@ -200,6 +217,7 @@ impl Atlas {
                 all.extend(at_size);
             }
         }
+        all.retain(|beside| beside.score > alone[&beside.other]);
         all.sort_by(|a, b| b.score.total_cmp(&a.score));
         self.diverse_beside(all, most)
     }
@@ -243,13 +261,18 @@ impl Search<'_> {
                 "closer sizes of {}",
                 self.atlas().probes[scan.probe].spec.name
             ));
-            // Where a reading or a speed is so many steps, one more or one less does nearly the same.
-            let closer = (scan.bottoms(&nothing, self.chance()).into_iter())
-                .filter_map(|hunt| self.trial.hunted_once(hunt));
-            let hunt = Hunt::least_first(closer.collect()).into_iter().next()?;
+            let hunt = self.best_of_bottoms(scan, &nothing)?;
             self.settled(&self.trial.hunted(&hunt)?)
         };
         self.scanned().iter().filter_map(closer).collect()
+    }
+
+    /// A hunt from the best of a scan's sizes that leave less than their neighbours, as sizes closer to each tell: where a reading or
+    /// a speed is so many steps, one more or one less does nearly the same.
+    fn best_of_bottoms(&self, scan: &Scan, base: &Base) -> Option<Hunt> {
+        let closer =
+            (scan.bottoms(base, self.chance()).into_iter()).filter_map(|hunt| self.trial.hunted_once(hunt));
+        Hunt::least_first(closer.collect()).into_iter().next()
     }
 
     /// A hypothesis simulated often enough to judge it, where it is.
@@ -322,10 +345,44 @@ impl Search<'_> {
             .collect()
     }
 
-    /// Effects whose action jumps with their size beside the best single effects and beside either of the best pair's; those that
-    /// come nowhere near the best are not tried to the end.
+    /// Sizes that jump all over their range beside what goes with them in the best explanations, as that has moved since they were
+    /// found; where these have none, or explain little, beside the best single effects and either of the best pair's. Those that come
+    /// nowhere near the best are not tried to the end.
     pub(super) fn scans_beside(&self, found: &[Found]) -> Vec<Found> {
-        const CLOSER: usize = 2;
+        let mut hunts: Vec<Hunt> = Vec::new();
+        let mut known: Vec<Vec<usize>> = Vec::new();
+        for (rest, probe) in found
+            .iter()
+            .flat_map(|found| self.beside_what_jumps(&found.hypothesis))
+        {
+            let mut probes = rest.probes();
+            probes.push(probe);
+            if known.len() < BASES && !known.contains(&probes) {
+                known.push(probes);
+                hunts.extend(self.hunts_beside(rest, std::iter::once(probe)));
+            }
+        }
+        if hunts.is_empty() || found[0].explanation.share <= verdict::MOST {
+            for base in self.single_bases(found) {
+                hunts.extend(self.hunts_beside(base, self.jumping()));
+            }
+        }
+        let starts = self.closest(hunts);
+        self.settle(self.descend_several(&starts, &ROUNDS_OF_SEVERAL, near(found)))
+    }
+
+    /// What goes with each effect that jumps of a hypothesis of several, and the probe of that.
+    fn beside_what_jumps(&self, hypothesis: &Hypothesis) -> Vec<(Hypothesis, usize)> {
+        let several = hypothesis.parts.len() > 1;
+        (0..hypothesis.parts.len())
+            .map(|i| (i, hypothesis.parts[i].probe))
+            .filter(|&(_, probe)| several && self.atlas().probes[probe].jumps())
+            .map(|(i, probe)| (hypothesis.without(i), probe))
+            .collect()
+    }
+
+    /// Effects of the best explanations that are of one size, each for itself.
+    fn single_bases(&self, found: &[Found]) -> Vec<Hypothesis> {
         let mut bases: Vec<Hypothesis> = Vec::new();
         for part in found.iter().flat_map(|found| &found.hypothesis.parts) {
             let spec = |part: &Part| self.atlas().probes[part.probe].spec;
@@ -335,24 +392,52 @@ impl Search<'_> {
                 bases.push(Hypothesis::of(part.clone()));
             }
         }
+        bases
+    }
+
+    /// The best single effect and others that lack little more of explaining everything, with effects whose action jumps with their size
+    /// beside them: those that come closest.
+    pub(super) fn jumping_beside(&self, singles: &[Found]) -> Vec<Hypothesis> {
+        /// How often as much another single effect may lack.
+        const NEAR: f64 = 2.0;
+        let lacks = |single: &Found| self.signal() - single.explanation.score;
+        let most = singles.first().map_or(0.0, |best| NEAR * lacks(best).max(0.0));
+        let near = |single: &&Found| lacks(single) <= most;
         let mut hunts: Vec<Hunt> = Vec::new();
-        for base in bases {
-            let spec = self.atlas().probes[base.parts[0].probe].spec;
-            let base = self.trial.base(base);
-            for probe in self
+        for single in (of_other_effects(singles.iter().filter(near)).into_iter()).take(BASES) {
+            // What jumps beside the best does so beside the others.
+            let best = hunts.iter().min_by(|a, b| a.left.total_cmp(&b.left));
+            let probe = best.map(Hunt::probe);
+            let probes = self
                 .jumping()
-                .filter(|&probe| self.atlas().probes[probe].spec != spec)
-            {
-                let name = self.atlas().probes[probe].spec.name;
-                self.tell(format_args!("every size of {name} beside {}", spec.name));
-                let scan = self.trial.scan(&base, probe);
-                hunts.extend(scan.and_then(|scan| scan.best(&base, self.chance())));
-            }
+                .filter(|&other| probe.is_none_or(|probe| probe == other));
+            hunts.extend(self.hunts_beside(single.hypothesis.clone(), probes));
         }
-        let starts: Vec<Hypothesis> = (Hunt::least_first(hunts).iter().take(CLOSER))
+        self.closest(hunts)
+    }
+
+    /// Hunts from the best size of each of some probes that jump beside a hypothesis that has none of its effect.
+    fn hunts_beside(&self, base: Hypothesis, probes: impl Iterator<Item = usize>) -> Vec<Hunt> {
+        let spec = |probe: usize| self.atlas().probes[probe].spec;
+        let own: Vec<_> = base.parts.iter().map(|part| spec(part.probe)).collect();
+        let base = self.trial.base(base);
+        let hunt = |probe: usize| {
+            let own = own.iter().map(|own| own.name).collect::<Vec<_>>().join(" + ");
+            self.tell(format_args!("every size of {} beside {own}", spec(probe).name));
+            self.best_of_bottoms(&self.trial.scan(&base, probe)?, &base)
+        };
+        probes
+            .filter(|&probe| !own.contains(&spec(probe)))
+            .filter_map(hunt)
+            .collect()
+    }
+
+    /// The hunts that leave least, each at the best of sizes ever closer.
+    fn closest(&self, hunts: Vec<Hunt>) -> Vec<Hypothesis> {
+        const CLOSEST: usize = 2;
+        (Hunt::least_first(hunts).iter().take(CLOSEST))
             .filter_map(|hunt| self.trial.hunted(hunt))
-            .collect();
-        self.settle(self.descend_several(&starts, &ROUNDS_OF_SEVERAL, near(found)))
+            .collect()
     }
 
     fn jumping(&self) -> impl Iterator<Item = usize> {

@@ -12,7 +12,7 @@ const HARDLY_P: f64 = 1e-4;
 /// Share of the excess that an explanation must explain to stand in spite of a significant remainder.
 pub(super) const ENOUGH: f64 = 0.98;
 /// The same for several effects, which have more freedom to be wrong.
-const ALL_BUT: f64 = 0.995;
+pub(super) const ALL_BUT: f64 = 0.995;
 /// Share that several effects, or one without a name, must explain to be claimed in part.
 pub(super) const MOST: f64 = 0.9;
 /// What an explanation that is claimed in part may leave, as a multiple of what chance makes of it.
