@@ -240,10 +240,23 @@ impl Search<'_> {
     /// The best pairs, tried to the end until one leaves nothing significant: those that together explain most as far as actions add
     /// up, the best single effects with what explains their remainder best, and sizes that jump with another effect, which come
     /// first where they promise more. Before these come last, sizes that jump are tried for themselves and added to the single
-    /// effects, if that was not done yet.
+    /// effects, if that was not done yet; first of all where they promise as much as the best of these explains.
     pub(super) fn pairs(&self, singles: &mut Vec<Found>) -> Vec<Found> {
+        let fits = |singles: &[Found]| singles.first().is_some_and(|best| best.explanation.fits());
+        let mut scanned = self.was_scanned();
+        if !scanned && self.jumps_promise_as_much(singles) {
+            self.scan(singles);
+            if fits(singles) {
+                return Vec::new();
+            }
+            scanned = true;
+        }
         let mut tried = Tried::new(&ROUNDS_OF_SEVERAL, f64::NEG_INFINITY);
-        let mut hunts = self.promising_hunts();
+        let mut hunts = if scanned {
+            self.promising_hunts()
+        } else {
+            Vec::new()
+        };
         let beats_others = |left: f64| self.together().first().is_none_or(|best| left < best.left);
         let jumps_first = hunts.first().is_some_and(|hunt| beats_others(hunt.left));
         if jumps_first {
@@ -263,9 +276,9 @@ impl Search<'_> {
             self.descend_on(&mut tried, further);
         }
         if !tried.fits() && !jumps_first && !self.explains_most(&tried) {
-            if !self.was_scanned() {
+            if !scanned {
                 self.scan(singles);
-                if singles.first().is_some_and(|best| best.explanation.fits()) {
+                if fits(singles) {
                     return self.settle(tried.descents);
                 }
             }
@@ -277,12 +290,9 @@ impl Search<'_> {
         self.with_exchanged(tried)
     }
 
-    /// Pairs with a size that jumps, if sizes were simulated all over their range and these pairs promise more than those that are
-    /// looked for together: they promise rather more than they keep.
+    /// Pairs with a size that jumps, if these promise more than those that are looked for together: they promise rather more than they
+    /// keep.
     fn promising_hunts(&self) -> Vec<Hunt> {
-        if !self.was_scanned() {
-            return Vec::new();
-        }
         let screened = self.screened_pairs_that_jump();
         let promise = screened.first().map_or(f64::NEG_INFINITY, |best| best.score);
         if self.together().first().is_some_and(|best| promise < best.score) {

@@ -286,6 +286,19 @@ impl Search<'_> {
         self.scanned.get().is_some()
     }
 
+    /// Whether an effect that jumps leaves no more at one of the sizes all over its range than the best single effect, but for the noise
+    /// of few simulations.
+    pub(super) fn jumps_promise_as_much(&self, singles: &[Found]) -> bool {
+        /// That noise, in units of what chance leaves.
+        const NOISE: f64 = 0.5;
+        let looks = self.scanned().iter().flat_map(|scan| &scan.looks);
+        let least = looks.map(Look::square).fold(f64::INFINITY, f64::min);
+        let best = singles
+            .first()
+            .map_or(f64::INFINITY, |best| best.left.norm_squared());
+        least < best + NOISE * self.chance()
+    }
+
     /// What every effect that jumps leaves at sizes all over its range; simulated once.
     fn scanned(&self) -> &[Scan] {
         self.scanned.get_or_init(|| {
