@@ -167,7 +167,7 @@ fn explain(search: &Search<'_>, mut found: Vec<Found>) -> Vec<Found> {
         // What explains most and leaves something lacks a second effect rather than another name.
         let lacks_another =
             best.share > MOST && !jumps && !goes_over_runs_or_time(best) && !hides_what_is_left(best);
-        suffices(best) && !is_doubtful(best, ALL_BUT) || lacks_another && !best.fits()
+        suffices(best) && !is_doubtful(best, ENOUGH) || lacks_another && !best.fits()
     };
     if !first_is(&found, needs_no_scan) {
         let clear = search.clear_pairs();
@@ -193,6 +193,10 @@ fn explain(search: &Search<'_>, mut found: Vec<Found>) -> Vec<Found> {
                 search.scan(&mut found);
             }
         }
+    }
+    // A rounding may be what a name explains nearly.
+    if !search.was_scanned() && first_is(&found, |best| suffices(best) && is_doubtful(best, ALL_BUT)) {
+        search.scan(&mut found);
     }
     found.extend(search.patterns(worth_a_pattern(&found)));
     sort(&mut found);
@@ -249,11 +253,12 @@ fn with_others_alike(search: &Search<'_>, mut found: Vec<Found>) -> Vec<Found> {
         if (found.iter()).any(|known| known.hypothesis.is_near(&other.hypothesis, search.atlas())) {
             continue;
         }
-        let comes_before = |one: &Found| {
-            one.explanation.score < other.explanation.score
-                || one.explanation.effects.len() != other.explanation.effects.len()
-        };
-        let place = found.iter().position(comes_before).unwrap_or(found.len());
+        let score = other.explanation.score;
+        let as_many = |one: &Found| one.explanation.effects.len() == other.explanation.effects.len();
+        let place = (found.iter())
+            .position(|one| as_many(one) && one.explanation.score < score)
+            .or_else(|| found.iter().rposition(as_many).map(|last| last + 1))
+            .unwrap_or(found.len());
         found.insert(place, other);
     }
     found

@@ -433,10 +433,10 @@ impl Search<'_> {
     fn hunts_beside(&self, base: Hypothesis, probes: impl Iterator<Item = usize>) -> Vec<Hunt> {
         let spec = |probe: usize| self.atlas().probes[probe].spec;
         let own: Vec<_> = base.parts.iter().map(|part| spec(part.probe)).collect();
+        let names = own.iter().map(|own| own.name).collect::<Vec<_>>().join(" + ");
         let base = self.trial.base(base);
         let hunt = |probe: usize| {
-            let own = own.iter().map(|own| own.name).collect::<Vec<_>>().join(" + ");
-            self.tell(format_args!("every size of {} beside {own}", spec(probe).name));
+            self.tell(format_args!("every size of {} beside {names}", spec(probe).name));
             self.best_of_bottoms(&self.trial.scan(&base, probe)?, &base)
         };
         probes
