@@ -359,7 +359,7 @@ impl Search<'_> {
     }
 
     /// Sizes that jump all over their range beside what goes with them in the best explanations, as that has moved since they were
-    /// found; where these have none, or explain little, beside the best single effects and either of the best pair's. Those that come
+    /// found; where these explain little, beside the best single effects and either of the best pair's. Those that come
     /// nowhere near the best are not tried to the end.
     pub(super) fn scans_beside(&self, found: &[Found]) -> Vec<Found> {
         let mut hunts: Vec<Hunt> = Vec::new();
@@ -375,7 +375,7 @@ impl Search<'_> {
                 hunts.extend(self.hunts_beside(rest, std::iter::once(probe)));
             }
         }
-        if hunts.is_empty() || found[0].explanation.share <= verdict::MOST {
+        if found[0].explanation.share <= verdict::MOST {
             for base in self.single_bases(found) {
                 hunts.extend(self.hunts_beside(base, self.jumping()));
             }
