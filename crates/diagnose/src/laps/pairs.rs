@@ -21,8 +21,8 @@ pub(super) struct Piece {
     /// Shares of the piece that are allowed.
     low: f64,
     high: f64,
-    pub(super) from: White,
-    pub(super) along: White,
+    from: White,
+    along: White,
     /// Products of the two with themselves and with each other.
     from_square: f64,
     along_square: f64,

@@ -186,9 +186,10 @@ impl Atlas {
     fn screen_beside_scans(&self, residual: &White, scans: &[Scan], most: usize) -> Vec<Beside> {
         let pieces = self.smooth_pieces();
         let Columns { from, along } = Columns::of(&pieces);
+        let (along_residual, from_residual) = (along.tr_mul(residual), from.tr_mul(residual));
         let mut alone: BTreeMap<usize, f64> = BTreeMap::new();
-        for piece in &pieces {
-            let (gain, _) = piece.best(piece.along.dot(residual), piece.from.dot(residual));
+        for (i, piece) in pieces.iter().enumerate() {
+            let (gain, _) = piece.best(along_residual[i], from_residual[i]);
             let score = self.score_of_constant(piece.probe, 0.5 * gain);
             let best = alone.entry(piece.probe).or_insert(score);
             *best = best.max(score);
