@@ -62,6 +62,11 @@ impl Explanation {
             .collect()
     }
 
+    /// How many numbers were fitted.
+    pub(crate) fn fitted(&self) -> usize {
+        self.effects.iter().map(|effect| effect.fitted).sum()
+    }
+
     /// Whether a cause without a name is among the effects.
     pub(crate) fn has_no_name(&self) -> bool {
         self.effects.iter().any(|effect| *effect.setting.spec == UNLISTED)
@@ -93,6 +98,9 @@ impl Explanation {
 
 /// Log-likelihood within which explanations are alternatives.
 pub(crate) const ALTERNATIVE: f64 = 5.0;
+
+/// Share of what is explained that further effects must gain, unless they alone fit: at very high signal no model is exact.
+pub(crate) const FAULTS: f64 = 2e-4;
 
 /// How many of the first explanations, best first, data do not tell from the best: of as many effects, with a cause without a
 /// name if it has one, and not so far behind.
@@ -179,6 +187,26 @@ impl Answer {
             Verdict::Faithful | Verdict::Unexplained => None,
             Verdict::Explained | Verdict::PartlyExplained => self.explanations.first(),
         }
+    }
+
+    /// Explanations by more effects than are claimed, for which these data speak, but not enough: each further number gains five units
+    /// of log-likelihood, and all of them more than the faults of models do. Those within five units of the best of these, best first.
+    pub fn further(&self) -> Vec<&Explanation> {
+        let Some(claimed) = self.claimed().filter(|claimed| !claimed.has_no_name()) else {
+            return Vec::new();
+        };
+        let least = |numbers: usize| (ALTERNATIVE * numbers as f64).max(FAULTS * claimed.gain);
+        let speaks_for = |other: &&Explanation| {
+            let numbers = other.fitted().saturating_sub(claimed.fitted()).max(1);
+            other.effects.len() > claimed.effects.len()
+                && !other.has_no_name()
+                && other.gain - claimed.gain >= least(numbers)
+        };
+        let mut further: Vec<&Explanation> = self.explanations.iter().filter(speaks_for).collect();
+        further.sort_by(|a, b| b.score.total_cmp(&a.score));
+        let best = further.first().map_or(f64::INFINITY, |best| best.score);
+        further.retain(|other| other.score >= best - ALTERNATIVE);
+        further
     }
 
     /// The effects that are claimed, as the simulator takes them.
@@ -280,6 +308,45 @@ mod tests {
             left_out: Vec::new(),
             cause: None,
         }
+    }
+
+    /// One effect, claimed, beside others by some effects more that gain so much more by one number each.
+    fn claimed_beside(gains: &[f64]) -> Answer {
+        let mut claimed = answer(1.01, 1.0);
+        let both = claimed.explanations.remove(0);
+        let by = |effects: usize, gain: f64| Explanation {
+            effects: both.effects[..effects].to_vec(),
+            gain,
+            score: gain,
+            ..both.clone()
+        };
+        let further = gains.iter().map(|more| by(2, 1000.0 + more));
+        claimed.explanations = std::iter::once(by(1, 1000.0)).chain(further).collect();
+        claimed
+    }
+
+    #[test]
+    fn what_gains_five_units_a_number_is_listed_beside_what_is_claimed() {
+        let listed = |gains: &[f64]| -> Vec<f64> {
+            let answer = claimed_beside(gains);
+            answer.further().iter().map(|other| other.gain - 1000.0).collect()
+        };
+        assert_eq!(listed(&[4.9]), [] as [f64; 0]);
+        // Best first, and none that the best of them rules out.
+        assert_eq!(listed(&[6.0, 5.5, 12.0, 7.5, 4.0]), [12.0, 7.5]);
+    }
+
+    #[test]
+    fn neither_faults_of_models_nor_what_is_not_claimed_calls_for_more() {
+        let mut answer = claimed_beside(&[12.0]);
+        // .02 % of what is explained may be a fault of the model.
+        for explanation in &mut answer.explanations {
+            explanation.gain += 69_000.0;
+        }
+        assert!(answer.further().is_empty());
+        answer = claimed_beside(&[12.0]);
+        answer.verdict = Verdict::Unexplained;
+        assert!(answer.further().is_empty());
     }
 
     #[test]

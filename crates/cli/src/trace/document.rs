@@ -14,7 +14,8 @@ pub(crate) fn document(trace: &Trace) -> Value {
     let answer = &trace.answer;
     let claimed = answer.claimed();
     let rivals = rivals(answer);
-    let sets: Vec<Vec<&str>> = distinct(rivals.iter().map(Explanation::names));
+    let sets = rivals.iter().chain(answer.further());
+    let sets: Vec<Vec<&str>> = distinct(sets.map(Explanation::names));
     let mut document = json!({
         "verdict": answer.verdict.name(),
         "residual": residual(trace),

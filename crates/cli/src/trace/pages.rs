@@ -101,12 +101,36 @@ pub(crate) fn summary(trace: &Trace) -> String {
             others.join("; ")
         )
     };
+    let further = further_in_words(trace);
     let next = next_in_words(trace).map_or(String::new(), |next| format!("\n{next}"));
     format!(
-        "{said}{alternatives}{next}\nError of the mean lap on held-out runs: {:.2} mm before, {:.2} mm after; {:.2} mm would be chance.",
+        "{said}{alternatives}{further}{next}\nError of the mean lap on held-out runs: {:.2} mm before, {:.2} mm after; {:.2} mm would be chance.",
         MM * trace.mean_m(|e| &e.before_m),
         MM * trace.mean_m(|e| &e.after_m),
         MM * trace.mean_m(|e| &e.floor_m)
+    )
+}
+
+/// What may be there beside what is claimed.
+fn further_in_words(trace: &Trace) -> String {
+    let Some(claimed) = trace.answer.claimed() else {
+        return String::new();
+    };
+    let further = trace.answer.further().into_iter().map(|further| {
+        let more = further.gain - claimed.gain;
+        format!(
+            "{} (gains {more:.1} units of log-likelihood more)",
+            further.label()
+        )
+    });
+    let further: Vec<String> = further.collect();
+    if further.is_empty() {
+        return String::new();
+    }
+    format!(
+        " Another effect may be there, for which these {} speak, but not enough to claim it: {}.",
+        trace.source(),
+        further.join("; ")
     )
 }
 
@@ -318,7 +342,7 @@ fn candidates(trace: &Trace) -> Vec<Block> {
     let mut table = Table::new(
         format!(
             "Explanations fitted to the {source}, best first by what they gain less the price of their numbers; those marked * cannot be \
-             told apart by these {source}"
+             told apart by these {source}, and for what those marked + have beside they speak, but not enough to claim it"
         ),
         &[
             "effect",
@@ -329,14 +353,17 @@ fn candidates(trace: &Trace) -> Vec<Block> {
             "size",
         ],
     );
+    let further = trace.answer.further();
     for (place, e) in trace.answer.explanations.iter().enumerate() {
-        let star = if place < trace.answer.indistinguishable {
+        let mark = if place < trace.answer.indistinguishable {
             " *"
+        } else if further.iter().any(|further| std::ptr::eq(*further, e)) {
+            " +"
         } else {
             ""
         };
         table.push([
-            format!("{}{star}", e.label()),
+            format!("{}{mark}", e.label()),
             units(e.gain),
             units(e.score),
             e.explained(trace.laps_alone())

@@ -25,9 +25,11 @@ mod trial;
 mod beside;
 mod groups;
 mod pairs;
+mod pieces;
 mod ripple;
 mod scans;
 mod screen;
+mod second;
 mod steadiness;
 
 // Their most likely sizes, and how well these are known.

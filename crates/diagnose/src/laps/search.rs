@@ -12,8 +12,8 @@ use super::atlas::{Atlas, White};
 use super::hypothesis::Hypothesis;
 use super::intervals::Interval;
 use super::observed::ObservedRun;
-use super::pairs::ScreenedPair;
 use super::part::{Freedom, Shape};
+use super::pieces::ScreenedPair;
 use super::refine::{Descent, Settled};
 use super::ripple::Ripple;
 use super::rounds::{

@@ -3,6 +3,7 @@
 use sim::Pattern;
 
 use super::search::{Found, STRONG};
+use crate::answer::FAULTS;
 use crate::{Explanation, Verdict};
 
 /// Probability of what is left below which something is left that is worth a search, however small a share it is.
@@ -32,9 +33,6 @@ const AS_GOOD: f64 = 0.01;
 const WORTH: f64 = 10.0;
 /// The same where what comes before stands without it.
 const WORTH_BESIDE: f64 = 15.0;
-/// Share of what is explained already that further effects must gain, unless they alone fit: at very high signal no model is
-/// exact.
-const FAULTS: f64 = 2e-4;
 /// Share that one effect must explain for what is left to be a fault of the model rather than a cause without a name.
 pub(super) const ALL_BUT_FAULTS: f64 = 0.999;
 
@@ -140,9 +138,8 @@ pub(super) fn preferred(fewer: Vec<Found>, more: Vec<Found>) -> Vec<Found> {
     let (Some(first), Some(further)) = (fewer.first(), more.first()) else {
         return if fewer.is_empty() { more } else { fewer };
     };
-    let count = |f: &Found| f.explanation.effects.iter().map(|c| c.fitted).sum::<usize>();
     let (a, b) = (&first.explanation, &further.explanation);
-    let numbers = count(further).saturating_sub(count(first));
+    let numbers = b.fitted().saturating_sub(a.fitted());
     // Patterns have a price of their own, which tells where as many numbers were fitted.
     let gained = if numbers == 0 {
         b.score - a.score

@@ -1,0 +1,120 @@
+//! A second effect beside a single one that explains nearly all.
+
+use super::hunt::Moved;
+use super::hypothesis::Hypothesis;
+use super::pairs::Tried;
+use super::rounds::ROUNDS_BESIDE;
+use super::screen::Screened;
+use super::search::{Found, Search};
+use super::verdict::{faults_beside, stands_alone, suffices};
+
+/// What could go with a single effect, by what it explains of that one's remainder.
+enum Promise {
+    /// Nothing.
+    None,
+    /// A little: these may be listed, but hardly claimed.
+    Little(Vec<Hypothesis>),
+    /// Enough to be claimed.
+    Enough(Vec<Hypothesis>),
+}
+
+impl Search<'_> {
+    /// The best pairs of a single effect that explains nearly all, the first of those found, tried to the end: those with what explains
+    /// best what it leaves. A size that jumps is looked for more closely first, and is then the first of those found.
+    pub(super) fn pairs_with_first(&self, found: &mut Vec<Found>) -> Vec<Found> {
+        let Some(single) = found.first() else {
+            return Vec::new();
+        };
+        let mut tried = Tried::new(
+            &ROUNDS_BESIDE,
+            single.explanation.score + fair_share_of_faults(single),
+        );
+        let jumps = self.jumps(&single.hypothesis);
+        let surely_lacks = !suffices(&single.explanation);
+        if jumps && surely_lacks {
+            self.descend_on(&mut tried, self.jumping_beside(found));
+        }
+        if !stands_alone(&single.explanation) && !single.explanation.fits() && !tried.fits() {
+            self.descend_on(&mut tried, self.pairs_about(single));
+        }
+        if !tried.fits() {
+            match self.promise_beside(single) {
+                Promise::None => {}
+                // Sizes that jump are rough.
+                Promise::Little(_) if jumps => {}
+                Promise::Little(pairs) => return self.try_rounds(pairs.iter(), &ROUNDS_BESIDE),
+                Promise::Enough(pairs) => {
+                    if let Some(closer) = self.with_closer_sizes(single) {
+                        found.insert(0, closer);
+                        return self.pairs_with_first(found);
+                    }
+                    self.descend_on(&mut tried, pairs);
+                    if !jumps && surely_lacks && !tried.fits() {
+                        self.descend_on(&mut tried, self.jumping_beside(found));
+                    }
+                }
+            }
+        }
+        self.with_exchanged(tried)
+    }
+
+    /// What explains best what a single effect leaves, if anything gains there what a further effect must, and a fair share of what the
+    /// faults of models may. Beside one that stands alone it must promise more to be claimed, and by one size: effects change the
+    /// scatter, and sizes that go over the runs follow that.
+    fn promise_beside(&self, single: &Found) -> Promise {
+        /// Scores, by paths and as simulated, of the least that could turn out to be worth its numbers.
+        const ENOUGH: f64 = 5.0;
+        /// The same by paths beside what stands alone, and of what may be listed there.
+        const ENOUGH_BESIDE: f64 = 10.0;
+        const LITTLE: f64 = 2.0;
+        let stands = stands_alone(&single.explanation);
+        let (little, enough) = if stands {
+            (LITTLE, ENOUGH_BESIDE)
+        } else {
+            (ENOUGH, ENOUGH)
+        };
+        let least = fair_share_of_faults(single);
+        let promises = |screened: &[Screened], score: f64| {
+            screened
+                .first()
+                .is_some_and(|best| best.score >= score.max(least))
+        };
+        self.tell(format_args!("what is beside {}", single.explanation.label()));
+        let base = self.trial.base(single.hypothesis.clone());
+        let mut screened = self.screened_beside(&base, &single.left);
+        screened.retain(|other| !stands || other.hypothesis.is_constant());
+        if !promises(&screened, little) {
+            return Promise::None;
+        }
+        let by_paths = promises(&screened, enough);
+        let heard = self.heard_beside(&base, screened);
+        let pairs = self.beside_of(&heard, &base, &single.left, &[]);
+        if by_paths && promises(&heard, ENOUGH) {
+            Promise::Enough(pairs)
+        } else if promises(&heard, little) {
+            Promise::Little(pairs)
+        } else {
+            Promise::None
+        }
+    }
+
+    /// An explanation at better sizes of what jumps, if there are any: sizes are rough, and a further effect would make up for what they
+    /// are off.
+    fn with_closer_sizes(&self, found: &Found) -> Option<Found> {
+        /// Log-likelihood that is worth it.
+        const BETTER: f64 = 5.0;
+        if found.hypothesis.parts.iter().all(|part| part.held.is_none()) {
+            return None;
+        }
+        self.tell(format_args!("closer sizes of {}", found.explanation.label()));
+        let hunted = self.trial.hunt_again(&found.hypothesis, Moved::Little)?;
+        let closer = self.settled(&hunted)?;
+        (closer.explanation.score > found.explanation.score + BETTER).then_some(closer)
+    }
+}
+
+/// A fair share of what the faults of models may gain beside a single effect.
+fn fair_share_of_faults(single: &Found) -> f64 {
+    const FAIR_SHARE: f64 = 0.3;
+    FAIR_SHARE * faults_beside(&single.explanation)
+}
