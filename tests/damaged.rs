@@ -47,7 +47,7 @@ fn a_robot_that_was_not_always_seen_is_no_other_robot() {
     let scratch = Scratch::new();
     let not_seen = |fields: &mut [String]| fields[1..3].iter_mut().for_each(String::clear);
     for (folder, robot) in [("faithful", as_declared()), ("limping", limping())] {
-        robot.logged(&[5; 3]).record(&scratch, folder);
+        robot.logged(&[4; 3]).record(&scratch, folder);
         for run in ["a", "b", "c"] {
             // A second and more in every eight, elsewhere in each lap, and each run.
             let first = 17 * usize::from(run.as_bytes()[0]);
@@ -212,7 +212,7 @@ fn damage(scratch: &Scratch, folder: &str) {
 fn a_bad_radio_clock_and_camera_are_no_effects() {
     let scratch = Scratch::new();
     for (folder, robot) in [("faithful", as_declared()), ("limping", limping())] {
-        robot.logged(&[5; 3]).record(&scratch, folder);
+        robot.logged(&[4; 3]).record(&scratch, folder);
         damage(&scratch, folder);
     }
     let found = trace(&scratch, "braitenberg", "faithful", &[]);
@@ -239,7 +239,7 @@ fn a_bad_radio_clock_and_camera_are_no_effects() {
 #[test]
 fn positions_in_millimetres_are_no_noise_of_the_robot() {
     let scratch = Scratch::new();
-    as_declared().logged(&[5; 3]).record(&scratch, "set");
+    as_declared().logged(&[4; 3]).record(&scratch, "set");
     for run in ["a", "b", "c"] {
         with_columns(&scratch, &format!("set/run_{run}.csv"), 1..3, |x_m| {
             format!("{x_m:.3}")
@@ -256,7 +256,7 @@ fn positions_in_millimetres_are_no_noise_of_the_robot() {
 #[test]
 fn what_is_held_out_is_seen_through_its_own_holes() {
     let scratch = Scratch::new();
-    let robot = as_declared().logged(&[8; 3]);
+    let robot = as_declared().logged(&[5; 3]);
     robot.record(&scratch, "all");
     let description = scratch.read("all/dataset.toml");
     for (set, runs) in [("set", ["a", "b"].as_slice()), ("held_out", &["c"])] {
