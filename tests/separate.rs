@@ -4,7 +4,7 @@ use serde_json::Value;
 use sim::{Setting, find};
 
 use crate::support::Scratch;
-use crate::tracing::{Robot, names, share_signatures, trace};
+use crate::tracing::{Robot, names, says, share_signatures, trace};
 
 fn alternatives(trace: &Value) -> Vec<&str> {
     let list = trace["effects"][0]["alternatives"].as_array().unwrap();
@@ -41,4 +41,24 @@ fn the_experiment_that_is_named_tells_the_alternatives_apart() {
         "{after:#}"
     );
     assert_eq!(after["logs"]["confirmed_by_laps"], true);
+}
+
+#[test]
+fn what_may_be_there_besides_is_listed_with_the_laps_that_would_tell() {
+    share_signatures("braitenberg");
+    let scratch = Scratch::new();
+    let mut robot = Robot::with(Setting::constant(find("camera-offset").unwrap(), [0.0029, 0.0]));
+    // Commands reach it as runs begin, and then no more.
+    let limit = Setting::constant(find("acceleration-limit").unwrap(), [0.25]);
+    robot.effects.push(limit);
+    robot.record(&scratch, "set");
+
+    let found = trace(&scratch, "braitenberg", "set", &[]);
+    says(&found, "explained", &["camera-offset"]);
+    let sets = serde_json::json!([["camera-offset"], ["camera-offset", "acceleration-limit"]]);
+    assert_eq!(found["alternative_sets"], sets, "{found:#}");
+    assert_eq!(found["effects"][0]["alternatives"], serde_json::json!([]));
+    let next = &found["separate_with"][0];
+    assert_eq!(next["against"][0]["name"], "camera-offset + acceleration-limit");
+    assert!(next["sigma"].as_f64().unwrap() > 1.0, "{next:#}");
 }

@@ -96,7 +96,7 @@ fn ideas(config: &Config, setup: &Setup) -> Vec<(String, Vec<(&'static str, Stri
     ideas
 }
 
-/// Experiments that would tell the answer from its rivals, the best first; none where nothing has to be told apart.
+/// Experiments that would tell the answer from its rivals, and from what may be there besides, the best first; none where nothing has to be told apart.
 ///
 /// # Errors
 /// Interrupted.
@@ -105,7 +105,7 @@ pub(crate) fn experiments(trace: &Trace, seed: u64) -> Result<Vec<Experiment>> {
         return Ok(Vec::new());
     };
     let mut others: Vec<&Explanation> = Vec::new();
-    for rival in rivals(&trace.answer).iter().skip(1) {
+    for rival in (rivals(&trace.answer).iter().skip(1)).chain(trace.answer.further()) {
         let known = others
             .iter()
             .chain([&answer])
