@@ -19,6 +19,8 @@ mod session;
 mod setup;
 mod sightings;
 mod table;
+#[cfg(test)]
+mod testing;
 mod trace;
 
 use std::process::ExitCode;

@@ -5,6 +5,7 @@ use proptest::prelude::*;
 use tempfile::TempDir;
 
 use super::*;
+use crate::testing::{DIGITS, LETTERS, one_of, word};
 
 /// The model of a file with this text, and `--set`s.
 fn load(text: &str, sets: &[&str]) -> (TempDir, anyhow::Result<ModelFile>) {
@@ -306,7 +307,7 @@ prop_compose! {
         rays in 0..1000_usize,
         table in proptest::collection::vec(proptest::array::uniform2(0.0..1e4_f64), 0..4),
         words in (0..2_usize, 0..2_usize, 0..2_usize, 0..2_usize),
-        world in "[ -~]{0,12}|.{0,6}",
+        world in prop_oneof![word(proptest::char::range(' ', '~'), 0..=12), word(any::<char>(), 0..=6)],
         effects in proptest::collection::vec(any_effect(), 0..3),
     ) -> Config {
         let mut config = Config::shipped();
@@ -333,13 +334,18 @@ fn any_effect() -> impl Strategy<Value = Effect> {
     let value = prop_oneof![
         number.clone().prop_map(Value::Float),
         any::<i64>().prop_map(Value::Integer),
-        "[a-z]{0,4}".prop_map(Value::String),
+        word(one_of(&[LETTERS]), 0..=4).prop_map(Value::String),
         proptest::collection::vec(number.prop_map(Value::Float), 0..4).prop_map(Value::Array),
     ];
     let by = proptest::option::of(prop_oneof![Just(Pattern::Run), Just(Pattern::Time)]);
     // A capital keeps parameters apart from `kind` and `by`.
-    let parameters = proptest::collection::btree_map("[A-Z][a-z_]{0,5}", value, 0..4);
-    ("[a-z-]{1,8}", by, parameters).prop_map(|(kind, by, parameters)| Effect {
+    let name = (
+        proptest::char::range('A', 'Z'),
+        word(one_of(&[LETTERS, "_-"]), 0..=5),
+    );
+    let name = name.prop_map(|(first, rest)| format!("{first}{rest}"));
+    let parameters = proptest::collection::btree_map(name, value, 0..4);
+    (word(one_of(&[LETTERS, "_-"]), 1..=8), by, parameters).prop_map(|(kind, by, parameters)| Effect {
         kind,
         by,
         parameters: parameters.into_iter().collect(),
@@ -355,7 +361,7 @@ proptest! {
     }
 
     #[test]
-    fn no_text_makes_it_panic(text in ".{0,40}", key in "[a-z.0-9]{0,12}") {
+    fn no_text_makes_it_panic(text in word(any::<char>(), 0..=40), key in word(one_of(&[LETTERS, DIGITS, "."]), 0..=12)) {
         let _ = load(&text, &[]).1;
         let _ = Config::shipped().with(&key, &text);
     }

@@ -9,6 +9,7 @@ use tempfile::TempDir;
 use super::write::run_csv;
 use super::*;
 use crate::output::sha256;
+use crate::testing::{DIGITS, one_of, word};
 
 const DATASET: &str = "name = \"case\"\nworld = \"roduit2007\"\ncontroller = \"braitenberg\"\n\
                        runs = [\"a\"]\nlaps = 3\nnote = \"by hand\"\n";
@@ -344,8 +345,12 @@ proptest! {
     }
 
     #[test]
-    fn no_text_makes_it_panic(dataset in ".{0,60}", run in "(t_s,x_m,y_m\n)?[0-9,.\n\"a]{0,60}") {
-        let folder = folder(&dataset, &run);
+    fn no_text_makes_it_panic(
+        dataset in word(any::<char>(), 0..=60),
+        header in prop_oneof![Just(""), Just("t_s,x_m,y_m\n")],
+        rows in word(one_of(&[DIGITS, ",.\n\"a"]), 0..=60),
+    ) {
+        let folder = folder(&dataset, &format!("{header}{rows}"));
         let _ = DataSet::load(folder.path());
         let _ = load_run_csv(&folder.path().join("run_a.csv"));
     }

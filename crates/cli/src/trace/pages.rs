@@ -339,10 +339,16 @@ fn candidates(trace: &Trace) -> Vec<Block> {
         return vec![Block::Text("Nothing had to be tried.".into())];
     }
     let source = trace.source();
+    let further = trace.answer.further();
+    let and_further = if further.is_empty() {
+        ""
+    } else {
+        "; what those marked + have besides may be there"
+    };
     let mut table = Table::new(
         format!(
             "Explanations fitted to the {source}, best first by what they gain less the price of their numbers; those marked * cannot be \
-             told apart by these {source}, and for what those marked + have beside they speak, but not enough to claim it"
+             told apart by these {source}{and_further}"
         ),
         &[
             "effect",
@@ -353,7 +359,6 @@ fn candidates(trace: &Trace) -> Vec<Block> {
             "size",
         ],
     );
-    let further = trace.answer.further();
     for (place, e) in trace.answer.explanations.iter().enumerate() {
         let mark = if place < trace.answer.indistinguishable {
             " *"
