@@ -96,7 +96,8 @@ fn ideas(config: &Config, setup: &Setup) -> Vec<(String, Vec<(&'static str, Stri
     ideas
 }
 
-/// Experiments that would tell the answer from its rivals, and from what may be there besides, the best first; none where nothing has to be told apart.
+/// Experiments that would tell the answer from its rivals, and from what may be there besides, the best first; none where nothing
+/// has to be told apart.
 ///
 /// # Errors
 /// Interrupted.
