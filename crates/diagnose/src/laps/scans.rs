@@ -360,8 +360,8 @@ impl Search<'_> {
     }
 
     /// Sizes that jump all over their range beside what goes with them in the best explanations, as that has moved since they were
-    /// found; where these explain little, beside the best single effects and either of the best pair's. Those that come
-    /// nowhere near the best are not tried to the end.
+    /// found; where these explain little, beside the best single effects and either of the best pair's, and beside a single one that
+    /// explains most. Those that come nowhere near the best are not tried to the end.
     pub(super) fn scans_beside(&self, found: &[Found]) -> Vec<Found> {
         let mut hunts: Vec<Hunt> = Vec::new();
         let mut known: Vec<Vec<usize>> = Vec::new();
@@ -381,7 +381,14 @@ impl Search<'_> {
                 hunts.extend(self.hunts_beside(base, self.jumping()));
             }
         }
-        let starts = self.closest(hunts);
+        let mut starts = self.closest(hunts);
+        // What explains most leaves a second effect rather than two; beside what explains nearly all they were looked for.
+        let is_single = |one: &&Found| one.explanation.effects.len() == 1 && !one.explanation.has_no_name();
+        let singles = found.iter().filter(is_single);
+        let most = verdict::MOST..verdict::ENOUGH;
+        if (singles.clone().next()).is_some_and(|single| most.contains(&single.explanation.share)) {
+            starts.extend(self.jumping_beside(singles));
+        }
         self.settle(self.descend_several(&starts, &ROUNDS_OF_SEVERAL, near(found)))
     }
 
@@ -411,14 +418,18 @@ impl Search<'_> {
 
     /// The best single effect and others that lack little more of explaining everything, with effects whose action jumps with their size
     /// beside them: those that come closest.
-    pub(super) fn jumping_beside(&self, singles: &[Found]) -> Vec<Hypothesis> {
+    pub(super) fn jumping_beside<'f>(
+        &self,
+        singles: impl Iterator<Item = &'f Found> + Clone,
+    ) -> Vec<Hypothesis> {
         /// How often as much another single effect may lack.
         const NEAR: f64 = 2.0;
         let lacks = |single: &Found| self.signal() - single.explanation.score;
-        let most = singles.first().map_or(0.0, |best| NEAR * lacks(best).max(0.0));
+        let best = singles.clone().next();
+        let most = best.map_or(0.0, |best| NEAR * lacks(best).max(0.0));
         let near = |single: &&Found| lacks(single) <= most;
         let mut hunts: Vec<Hunt> = Vec::new();
-        for single in (of_other_effects(singles.iter().filter(near)).into_iter()).take(BASES) {
+        for single in (of_other_effects(singles.filter(near)).into_iter()).take(BASES) {
             // What jumps beside the best does so beside the others.
             let best = hunts.iter().min_by(|a, b| a.left.total_cmp(&b.left));
             let probe = best.map(Hunt::probe);

@@ -32,7 +32,7 @@ impl Search<'_> {
         let jumps = self.jumps(&single.hypothesis);
         let surely_lacks = !suffices(&single.explanation);
         if jumps && surely_lacks {
-            self.descend_on(&mut tried, self.jumping_beside(found));
+            self.descend_on(&mut tried, self.jumping_beside(found.iter()));
         }
         if !stands_alone(&single.explanation) && !single.explanation.fits() && !tried.fits() {
             self.descend_on(&mut tried, self.pairs_about(single));
@@ -50,7 +50,7 @@ impl Search<'_> {
                     }
                     self.descend_on(&mut tried, pairs);
                     if !jumps && surely_lacks && !tried.fits() {
-                        self.descend_on(&mut tried, self.jumping_beside(found));
+                        self.descend_on(&mut tried, self.jumping_beside(found.iter()));
                     }
                 }
             }
