@@ -67,6 +67,13 @@ impl Explanation {
         self.effects.iter().map(|effect| effect.fitted).sum()
     }
 
+    /// Log-likelihood that the faults of models may gain beside it: at very high signal no model is exact.
+    pub(crate) fn faults(&self) -> f64 {
+        /// Share of what is explained.
+        const FAULTS: f64 = 2e-4;
+        FAULTS * self.gain
+    }
+
     /// Whether a cause without a name is among the effects.
     pub(crate) fn has_no_name(&self) -> bool {
         self.effects.iter().any(|effect| *effect.setting.spec == UNLISTED)
@@ -98,9 +105,6 @@ impl Explanation {
 
 /// Log-likelihood within which explanations are alternatives.
 pub(crate) const ALTERNATIVE: f64 = 5.0;
-
-/// Share of what is explained that further effects must gain, unless they alone fit: at very high signal no model is exact.
-pub(crate) const FAULTS: f64 = 2e-4;
 
 /// How many of the first explanations, best first, data do not tell from the best: of as many effects, with a cause without a
 /// name if it has one, and not so far behind.
@@ -195,7 +199,7 @@ impl Answer {
         let Some(claimed) = self.claimed().filter(|claimed| !claimed.has_no_name()) else {
             return Vec::new();
         };
-        let least = |numbers: usize| (ALTERNATIVE * numbers as f64).max(FAULTS * claimed.gain);
+        let least = |numbers: usize| (ALTERNATIVE * numbers as f64).max(claimed.faults());
         let speaks_for = |other: &&Explanation| {
             let numbers = other.fitted().saturating_sub(claimed.fitted()).max(1);
             other.effects.len() > claimed.effects.len()

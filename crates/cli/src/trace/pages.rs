@@ -362,7 +362,7 @@ fn candidates(trace: &Trace) -> Vec<Block> {
     for (place, e) in trace.answer.explanations.iter().enumerate() {
         let mark = if place < trace.answer.indistinguishable {
             " *"
-        } else if further.iter().any(|further| std::ptr::eq(*further, e)) {
+        } else if further.contains(&e) {
             " +"
         } else {
             ""

@@ -3,7 +3,6 @@
 use sim::Pattern;
 
 use super::search::{Found, STRONG};
-use crate::answer::FAULTS;
 use crate::{Explanation, Verdict};
 
 /// Probability of what is left below which something is left that is worth a search, however small a share it is.
@@ -150,11 +149,7 @@ pub(super) fn preferred(fewer: Vec<Found>, more: Vec<Found>) -> Vec<Found> {
     let covered = if noises(a) > 0 { AS_GOOD } else { 0.0 };
     let better = b.fits() || b.share >= ALL_BUT || !suffices(a) && b.share > a.share - covered;
     let worth = if suffices(a) { WORTH_BESIDE } else { WORTH };
-    let faults = if b.fits() {
-        faults_beside(a)
-    } else {
-        FAULTS * a.gain
-    };
+    let faults = if b.fits() { faults_beside(a) } else { a.faults() };
     let wins = gained > faults.max(worth * numbers.max(1) as f64) && better && !heaps_noise(b);
     with_first(wins, more, fewer)
 }
@@ -162,7 +157,7 @@ pub(super) fn preferred(fewer: Vec<Found>, more: Vec<Found>) -> Vec<Found> {
 /// What the faults of models may gain beside an explanation: more effects that fit must gain more if it stands without them.
 pub(super) fn faults_beside(explanation: &Explanation) -> f64 {
     if suffices(explanation) {
-        FAULTS * explanation.gain
+        explanation.faults()
     } else {
         0.0
     }
