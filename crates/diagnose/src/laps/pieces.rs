@@ -1,5 +1,7 @@
 //! Straight pieces of the paths that were simulated beforehand, one or two of which come nearest to a residual.
 
+use std::collections::BTreeMap;
+
 use nalgebra::{DMatrix, DVector};
 
 use super::atlas::{Atlas, White};
@@ -106,8 +108,7 @@ impl Atlas {
             along_target: along.tr_mul(residual),
             from_target: from.tr_mul(residual),
         };
-        let mut best: std::collections::BTreeMap<(usize, usize), (f64, [f64; 2])> =
-            std::collections::BTreeMap::new();
+        let mut best: BTreeMap<(usize, usize), (f64, [f64; 2])> = BTreeMap::new();
         for (i, a) in pieces.iter().enumerate() {
             for (j, b) in pieces.iter().enumerate().skip(i + 1) {
                 if self.probes[a.probe].spec == self.probes[b.probe].spec {
@@ -123,23 +124,24 @@ impl Atlas {
                 }
             }
         }
-        let mut pairs: Vec<ScreenedPair> = best
-            .into_iter()
-            .map(|((a, b), (gain, sizes))| {
-                let part = |probe, size| Part::screened(self, probe, Shape::Constant, &[size]);
-                let hypothesis = Hypothesis {
-                    parts: vec![part(a, sizes[0]), part(b, sizes[1])],
-                };
+        let mut best: Vec<_> = (best.into_iter())
+            .map(|((a, b), (gain, sizes))| ([a, b], self.score_of_pair([a, b], 0.5 * gain), gain, sizes))
+            .collect();
+        best.sort_by(|a, b| b.1.total_cmp(&a.1));
+        let name = |probe: usize| self.probes[probe].spec.name;
+        diverse(best.into_iter(), |(probes, ..)| (*probes, probes.map(name)), most)
+            .map(|(probes, score, gain, sizes)| {
+                let part = |i: usize| Part::screened(self, probes[i], Shape::Constant, &[sizes[i]]);
                 ScreenedPair {
-                    hypothesis,
-                    score: self.score_of_pair([a, b], 0.5 * gain),
+                    hypothesis: Hypothesis {
+                        parts: vec![part(0), part(1)],
+                    },
+                    score,
                     left: residual.norm_squared() - gain,
                     sizes,
                 }
             })
-            .collect();
-        pairs.sort_by(|a, b| b.score.total_cmp(&a.score));
-        self.diverse(pairs, most)
+            .collect()
     }
 
     /// A pair's gain less the price of its numbers and of having been chosen.
@@ -148,26 +150,6 @@ impl Atlas {
             price(self.probes[probe].free.len(), self.layout.total_laps()) + self.choice(probe)
         };
         gain - probes.map(price_of).iter().sum::<f64>()
-    }
-
-    /// The best pairs, of the same two effects at most two.
-    fn diverse(&self, sorted: Vec<ScreenedPair>, most: usize) -> Vec<ScreenedPair> {
-        const ALIKE: usize = 2;
-        let names = |pair: &ScreenedPair| -> Vec<&str> {
-            pair.hypothesis
-                .parts
-                .iter()
-                .map(|part| self.probes[part.probe].spec.name)
-                .collect()
-        };
-        let mut kept: Vec<ScreenedPair> = Vec::new();
-        for pair in sorted {
-            let alike = kept.iter().filter(|other| names(other) == names(&pair)).count();
-            if kept.len() < most && alike < ALIKE {
-                kept.push(pair);
-            }
-        }
-        kept
     }
 
     /// The paths of all probes that do not jump.
@@ -189,6 +171,33 @@ impl Atlas {
         };
         nodes.windows(2).enumerate().map(piece).collect()
     }
+}
+
+/// The first pairs, of the same two effects at most two, and at most half of them with the same probe: one that explains much alone
+/// does so with any other, and leaves no room for two of which neither does. `of` tells a pair's probes and their effects.
+fn diverse<'n, T>(
+    sorted: impl Iterator<Item = T>,
+    of: impl Fn(&T) -> ([usize; 2], [&'n str; 2]),
+    most: usize,
+) -> impl Iterator<Item = T> {
+    const ALIKE: usize = 2;
+    let with_probe = most.div_ceil(2);
+    let mut of_effects: BTreeMap<[&str; 2], usize> = BTreeMap::new();
+    let mut of_probe: BTreeMap<usize, usize> = BTreeMap::new();
+    let has_room = move |pair: &T| {
+        let (probes, effects) = of(pair);
+        let alike = of_effects.entry(effects).or_default();
+        let is_full = |probe: &usize| of_probe.get(probe) == Some(&with_probe);
+        if *alike == ALIKE || probes.iter().any(is_full) {
+            return false;
+        }
+        *alike += 1;
+        for probe in probes {
+            *of_probe.entry(probe).or_default() += 1;
+        }
+        true
+    };
+    sorted.filter(has_room).take(most)
 }
 
 /// Scalar products of everything that a pair's distance needs.
@@ -240,6 +249,21 @@ impl Products {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_strong_effect_leaves_room_for_pairs_without_it() {
+        // Effects by their initials, probes by their number: a patch has two places.
+        let effects = ["gain", "wall", "patch", "patch", "lag", "slip", "axle"];
+        let pairs = [[0, 2], [0, 3], [2, 3], [0, 4], [0, 5], [1, 4], [5, 6], [1, 6]];
+        let of = |pair: &[usize; 2]| (*pair, pair.map(|probe| effects[probe]));
+        let kept: Vec<[usize; 2]> = diverse(pairs.into_iter(), of, 6).collect();
+        assert_eq!(kept, [[0, 2], [0, 3], [2, 3], [0, 4], [1, 4], [5, 6]]);
+        let same = [[0, 2], [0, 3], [0, 2], [1, 2]];
+        assert_eq!(
+            diverse(same.into_iter(), of, 9).collect::<Vec<_>>(),
+            [[0, 2], [0, 3], [1, 2]]
+        );
+    }
 
     #[test]
     fn the_best_point_of_a_piece_is_the_projection_within_its_bounds() {
