@@ -244,10 +244,10 @@ fn explain(search: &Search<'_>, mut found: Vec<Found>) -> Vec<Found> {
 /// Explanations with those that are the first but for a bump or patch at the same place of a wall or another kind of slip, and
 /// those near it but for other sensors, in their order.
 fn with_others_alike(search: &Search<'_>, mut found: Vec<Found>) -> Vec<Found> {
-    let Some(best) = found.first().filter(|best| is_claimed(&best.explanation)) else {
+    if !first_is(&found, is_claimed) {
         return found;
-    };
-    let mut others = search.otherwise(best);
+    }
+    let mut others = search.otherwise(&found);
     others.extend(search.at_other_sensors(&found));
     for other in others {
         if (found.iter()).any(|known| known.hypothesis.is_near(&other.hypothesis, search.atlas())) {

@@ -192,8 +192,17 @@ impl Hypothesis {
 
     /// Whether another has the same constant effects at sizes less than a step away.
     pub(super) fn is_near(&self, other: &Self, atlas: &Atlas) -> bool {
-        let near = |part: &Part| other.parts.iter().any(|other| part.is_near(other, atlas));
-        self.parts.len() == other.parts.len() && self.parts.iter().all(near)
+        self.matches(other, |part, other| part.is_near(other, atlas))
+    }
+
+    /// Whether another has the same constant effects at the same places.
+    pub(super) fn is_at_places_of(&self, other: &Self, atlas: &Atlas) -> bool {
+        self.matches(other, |part, other| part.is_at_place_of(other, atlas))
+    }
+
+    fn matches(&self, other: &Self, same: impl Fn(&Part, &Part) -> bool) -> bool {
+        let known = |part: &Part| other.parts.iter().any(|other| same(part, other));
+        self.parts.len() == other.parts.len() && self.parts.iter().all(known)
     }
 
     /// All its effects but one.

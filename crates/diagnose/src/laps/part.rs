@@ -250,7 +250,19 @@ impl Part {
         probe.quantum.is_some() && self.per_s == 0.0 && self.values.iter().all(at_neutral)
     }
 
+    /// Whether another is the same constant effect at a size less than a step away, and at the same place.
     pub(super) fn is_near(&self, other: &Self, atlas: &Atlas) -> bool {
+        self.agrees_with(other, atlas, |_| true)
+    }
+
+    /// Whether another is the same constant effect at the same place, to less than a step, whatever its size.
+    pub(super) fn is_at_place_of(&self, other: &Self, atlas: &Atlas) -> bool {
+        let probe = &atlas.probes[self.probe];
+        self.agrees_with(other, atlas, |i| !probe.is_size(i))
+    }
+
+    /// Whether another is the same constant effect at values less than a step away, of the parameters that count.
+    fn agrees_with(&self, other: &Self, atlas: &Atlas, counts: impl Fn(usize) -> bool) -> bool {
         let probe = &atlas.probes[self.probe];
         let step = |i: usize| {
             probe
@@ -264,7 +276,7 @@ impl Part {
         probe.spec == atlas.probes[other.probe].spec
             && [self.shape, other.shape] == [Shape::Constant; 2]
             && self.values[0].len() == other.values[0].len()
-            && (0..self.values[0].len()).all(near)
+            && (0..self.values[0].len()).filter(|&i| counts(i)).all(near)
     }
 
     pub(super) fn setting(&self, probe: &Probe) -> Setting {

@@ -168,15 +168,22 @@ impl Search<'_> {
     }
 
     /// Descents with better sizes of the effects that jump, which were found beside others that have moved since: those of
-    /// the best descent, for all that are near it, until they come to rest; and those of rivals, for themselves.
+    /// the best descent, for all that are near it, until they come to rest or no longer matter; and those of rivals, for themselves.
     fn hunted_again(&self, mut descents: Vec<Descent>) -> Vec<Descent> {
-        /// How far the other effects have moved from one time to the next.
-        const MOVED: [Moved; 3] = [Moved::Far, Moved::Little, Moved::Little];
-        /// Share of the best score by which a descent may lie behind it and still be looked at, and how many at most.
-        const SHARE: f64 = 0.03;
+        /// Looks at sizes ever better, and as many more where each still gains much.
+        const LOOKS: usize = 3;
+        /// Share of the best score by which a descent may lie behind it and still be looked at, at first and later, and how many at most.
+        const SHARES: [f64; 2] = [0.03, 0.004];
         const MOST: usize = 4;
+        /// Log-likelihood by which better sizes must change the best for still better ones to matter.
+        const MATTERS: f64 = 5.0;
         let held = |part: &Part| part.held.is_some();
-        for moved in MOVED {
+        for look in 0..2 * LOOKS {
+            let (moved, share) = if look == 0 {
+                (Moved::Far, SHARES[0])
+            } else {
+                (Moved::Little, SHARES[1])
+            };
             let best = best_of(&descents).map(|best| &best.hypothesis);
             let Some(best) = best.filter(|best| best.parts.len() > 1 && best.parts.iter().any(held)) else {
                 break;
@@ -189,7 +196,7 @@ impl Search<'_> {
             let rest =
                 (hunted.parts.iter().zip(&best.parts)).all(|(now, before)| now.is_within_error_of(before));
             let known: Vec<Part> = hunted.parts.into_iter().filter(held).collect();
-            let least = before - NEAR.max(SHARE * before);
+            let least = before - NEAR.max(share * before);
             descents.sort_by(|a, b| b.score.total_cmp(&a.score));
             descents = (descents.into_par_iter().enumerate())
                 .filter_map(|(place, descent)| {
@@ -200,8 +207,16 @@ impl Search<'_> {
                     self.trial.descend(start, Round::Full)
                 })
                 .collect();
-            let in_vain = |best: &Descent| best.leaves_far_too_much() && is_slow(best, best.score - before);
-            if rest || best_of(&descents).is_some_and(in_vain) {
+            let ends = |best: &Descent| {
+                let gained = best.score - before;
+                let matters = if look + 1 < LOOKS {
+                    gained.abs() > MATTERS
+                } else {
+                    gained > NEAR
+                };
+                !matters || best.leaves_far_too_much() && is_slow(best, gained)
+            };
+            if rest || best_of(&descents).is_some_and(ends) {
                 break;
             }
         }

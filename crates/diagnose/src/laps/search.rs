@@ -153,9 +153,12 @@ impl Search<'_> {
         self.settle(self.descend(starts.iter(), &ROUNDS_FROM_NEAR, f64::NEG_INFINITY))
     }
 
-    /// An explanation with a patch of a wall in place of a bump or the other way round, and with slip of the other kind, tried to the end:
-    /// places were screened at a coarse grid, and of slip by the noise of paths.
-    pub(super) fn otherwise(&self, best: &Found) -> Vec<Found> {
+    /// The first of some explanations with a patch of a wall in place of a bump or the other way round, and with slip of the other kind,
+    /// tried to the end unless it is among them: places were screened at a coarse grid, and of slip by the noise of paths.
+    pub(super) fn otherwise(&self, found: &[Found]) -> Vec<Found> {
+        let Some(best) = found.first() else {
+            return Vec::new();
+        };
         let hypothesis = &best.hypothesis;
         let exchanged = |i: usize| {
             let part = &hypothesis.parts[i];
@@ -164,7 +167,12 @@ impl Search<'_> {
             let rest = hypothesis.without(i);
             others.map(move |other| rest.with(&Hypothesis::of(other)))
         };
-        let starts: Vec<Hypothesis> = (0..hypothesis.parts.len()).flat_map(exchanged).collect();
+        let is_new = |start: &Hypothesis| {
+            let known = |found: &Found| start.is_at_places_of(&found.hypothesis, self.atlas());
+            !found.iter().any(known)
+        };
+        let starts = (0..hypothesis.parts.len()).flat_map(exchanged).filter(is_new);
+        let starts: Vec<Hypothesis> = starts.collect();
         self.try_rounds(starts.iter(), &ROUNDS)
     }
 
@@ -172,6 +180,8 @@ impl Search<'_> {
     pub(super) fn at_other_sensors(&self, found: &[Found]) -> Vec<Found> {
         const NEAR: f64 = 8.0;
         const MOST: usize = 3;
+        /// Log-likelihood by which a descent may be behind and still end near the best.
+        const BEHIND: f64 = 25.0;
         let score = |found: &Found| found.explanation.score;
         let best = found.first().map_or(f64::INFINITY, score);
         let mut starts: Vec<Hypothesis> = Vec::new();
@@ -187,7 +197,9 @@ impl Search<'_> {
                 }
             }
         }
-        self.settle(self.descend(starts.iter(), &ROUNDS, best))
+        let mut descents = self.descend(starts.iter(), &ROUNDS, best);
+        descents.retain(|descent| descent.score > best - BEHIND.max(2.0 * descent.score_error));
+        self.settle(descents)
     }
 
     /// Explanations with what explains best what they leave beside them, tried to the end.
