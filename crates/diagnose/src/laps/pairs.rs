@@ -8,7 +8,7 @@ use super::hypothesis::Hypothesis;
 use super::part::{Part, Shape};
 use super::pieces::ScreenedPair;
 use super::refine::Descent;
-use super::rounds::{ROUNDS_OF_SEVERAL, Rung, best_of};
+use super::rounds::{ERRORS, ROUNDS_OF_SEVERAL, Rung, best_of};
 use super::screen::tangent;
 use super::search::{BASES, Found, NEARLY_ALL, STRONG, Search, of_other_effects};
 
@@ -157,7 +157,6 @@ impl Search<'_> {
     /// Pairs with either effect of the best one exchanged for others than were tried, tried to the end.
     pub(super) fn with_exchanged(&self, mut tried: Tried) -> Vec<Found> {
         // What is no better than fewer effects lacks none.
-        const ERRORS: f64 = 2.0;
         let may_be_better = |best: &Descent| best.score + ERRORS * best.score_error > tried.reached;
         if !best_of(&tried.descents).is_some_and(may_be_better) {
             return Vec::new();

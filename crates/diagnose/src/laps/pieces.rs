@@ -252,7 +252,7 @@ mod tests {
 
     #[test]
     fn a_strong_effect_leaves_room_for_pairs_without_it() {
-        // Effects by their initials, probes by their number: a patch has two places.
+        // The effect of each probe: a patch has two places.
         let effects = ["gain", "wall", "patch", "patch", "lag", "slip", "axle"];
         let pairs = [[0, 2], [0, 3], [2, 3], [0, 4], [0, 5], [1, 4], [5, 6], [1, 6]];
         let of = |pair: &[usize; 2]| (*pair, pair.map(|probe| effects[probe]));

@@ -64,7 +64,7 @@ pub(super) const ROUNDS_FROM_NEAR: [Rung; 2] =
 const NEAR: f64 = 50.0;
 
 /// Errors of a difference in log-likelihood that may be chance.
-const ERRORS: f64 = 2.0;
+pub(super) const ERRORS: f64 = 2.0;
 
 impl Search<'_> {
     /// Descends from every hypothesis and settles those that may be the best.
@@ -184,11 +184,13 @@ impl Search<'_> {
             } else {
                 (Moved::Little, SHARES[1])
             };
-            let best = best_of(&descents).map(|best| &best.hypothesis);
-            let Some(best) = best.filter(|best| best.parts.len() > 1 && best.parts.iter().any(held)) else {
+            let Some(best) = best_of(&descents) else {
                 break;
             };
-            let before = best_of(&descents).map_or(0.0, |best| best.score);
+            let (best, before) = (&best.hypothesis, best.score);
+            if best.parts.len() < 2 || !best.parts.iter().any(held) {
+                break;
+            }
             self.tell(format_args!("closer sizes of what jumps"));
             let Some(hunted) = self.trial.hunt_again(best, moved) else {
                 break;

@@ -17,7 +17,7 @@ use super::pieces::ScreenedPair;
 use super::refine::{Descent, Settled};
 use super::ripple::Ripple;
 use super::rounds::{
-    ROUNDS, ROUNDS_BESIDE, ROUNDS_FROM_NEAR, ROUNDS_OF_GROUPS, ROUNDS_OF_SEVERAL, Rung, best_of, near,
+    ERRORS, ROUNDS, ROUNDS_BESIDE, ROUNDS_FROM_NEAR, ROUNDS_OF_GROUPS, ROUNDS_OF_SEVERAL, Rung, best_of, near,
 };
 use super::scans::Scan;
 use super::tests_of_fit::{Departures, Quadratic, SIGNIFICANT_P};
@@ -198,7 +198,7 @@ impl Search<'_> {
             }
         }
         let mut descents = self.descend(starts.iter(), &ROUNDS, best);
-        descents.retain(|descent| descent.score > best - BEHIND.max(2.0 * descent.score_error));
+        descents.retain(|descent| descent.score > best - BEHIND.max(ERRORS * descent.score_error));
         self.settle(descents)
     }
 
