@@ -20,7 +20,7 @@ pub use corners::{Corners, other_cuts};
 pub use detectable::Detectable;
 pub use error::Error;
 pub use laps::{
-    Atlas, Baselines, Beginning, Departures, LapDiagnosis, MeanBeginning, ObservedLap, ObservedRun,
+    Atlas, Baselines, Beginning, Departures, Extent, LapDiagnosis, MeanBeginning, ObservedLap, ObservedRun,
     Quadratic, Rival, Simulate, Unseen, separations,
 };
 pub use log::{

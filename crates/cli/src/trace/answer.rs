@@ -2,8 +2,8 @@
 
 use anyhow::{Context, Result};
 use diagnose::{
-    Answer, Atlas, Baselines, Departures, Detectable, Explanation, LogDiagnosis, LoggedRun, ObservedRun,
-    Verdict, Watch, diagnose_logs,
+    Answer, Atlas, Baselines, Departures, Detectable, Explanation, Extent, LogDiagnosis, LoggedRun,
+    ObservedRun, Verdict, Watch, diagnose_logs,
 };
 use sim::{Pattern, Setting, Vec2};
 
@@ -70,18 +70,18 @@ impl<'a> TracedLaps<'a> {
         }
     }
 
-    fn simulate(&self, effects: &[Setting], set: u64) -> Option<Vec<ObservedRun>> {
+    fn simulate(&self, effects: &[Setting], set: u64, extent: Extent) -> Option<Vec<ObservedRun>> {
         let seeds = Seeds {
             session: self.seed,
             set,
         };
-        simulate_all(&self.recordings, effects, seeds)
+        simulate_all(&self.recordings, effects, seeds, extent)
     }
 
     /// How the laps depart from the declared model, and from the model with these effects; the latter is `None` where the robot then
     /// crashes.
     fn confirm(&self, effects: &[Setting]) -> Result<(Departures, Option<Departures>)> {
-        let simulate = |effects: &[Setting], set: u64| self.simulate(effects, set);
+        let simulate = |effects: &[Setting], set: u64, extent: Extent| self.simulate(effects, set, extent);
         Ok(self.atlas.confirm(&simulate, &self.runs, effects)?)
     }
 
@@ -96,7 +96,7 @@ impl<'a> TracedLaps<'a> {
 
     /// What the laps say; `watch` is told what is being tried.
     pub(super) fn named(&self, watch: &Watch<'_>) -> Result<Named> {
-        let simulate = |effects: &[Setting], set: u64| self.simulate(effects, set);
+        let simulate = |effects: &[Setting], set: u64, extent: Extent| self.simulate(effects, set, extent);
         let found = self
             .atlas
             .diagnose(&simulate, &self.runs, &self.places(), watch)?;

@@ -1,7 +1,7 @@
 //! What the declared model leads one to expect of a recording.
 
 use anyhow::Result;
-use diagnose::{Atlas, Simulate};
+use diagnose::{Atlas, Extent, Simulate};
 use sim::Setting;
 
 use super::cache::Cache;
@@ -16,8 +16,9 @@ fn with_simulations<R>(
     use_them: impl FnOnce(&Simulate<'_>, &[&Simulate<'_>]) -> R,
 ) -> R {
     let of = |setup| {
-        move |effects: &[Setting], set: u64| {
-            recording.simulate_anywhere(setup, effects, Seeds { session: seed, set })
+        move |effects: &[Setting], set: u64, extent: Extent| {
+            let seeds = Seeds { session: seed, set };
+            recording.simulate_anywhere(setup, effects, seeds, extent)
         }
     };
     let declared = of(&recording.setup);
@@ -28,11 +29,11 @@ fn with_simulations<R>(
 
 /// Laps simulated for a diagnosis; those of a cached atlas count as if they were simulated now.
 pub(super) fn laps_simulated(recordings: &[Recording], atlas: &Atlas, purpose: Purpose) -> u64 {
-    let of = |recording: &Recording| {
+    let for_atlas = |recording: &Recording| {
         let sets = purpose.sets(recording.cuts.len());
-        (sets + atlas.spent()) * recording.shape().iter().sum::<usize>() as u64
+        sets * recording.shape().iter().sum::<usize>() as u64
     };
-    recordings.iter().map(of).sum()
+    atlas.spent() + recordings.iter().map(for_atlas).sum::<u64>()
 }
 
 /// What an atlas is for.

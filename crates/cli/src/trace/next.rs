@@ -1,7 +1,7 @@
 //! The experiment that would tell apart what these data do not.
 
 use anyhow::Result;
-use diagnose::{Explanation, LogRow, ObservedRun, Rival, log_separation, separations};
+use diagnose::{Explanation, Extent, LogRow, ObservedRun, Rival, log_separation, separations};
 use sim::{Controller, Setting, Stage, Step, Streams};
 
 use super::Trace;
@@ -171,7 +171,7 @@ fn by_laps(
     others: &[&Explanation],
     seed: u64,
 ) -> Option<Vec<(String, f64)>> {
-    let simulate = |effects: &[Setting], set: u64| -> Option<Vec<ObservedRun>> {
+    let simulate = |effects: &[Setting], set: u64, _: Extent| -> Option<Vec<ObservedRun>> {
         let anywhere = |number| RunPlace {
             number,
             start: None,

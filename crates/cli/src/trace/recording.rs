@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use anyhow::{Context, Result, ensure};
-use diagnose::{ObservedRun, Unseen, coarse_unit_m};
+use diagnose::{Extent, ObservedRun, Unseen, coarse_unit_m};
 use sim::{Setting, Start, Step, Streams, Vec2, World};
 use track::Lap;
 
@@ -247,9 +247,14 @@ impl Recording {
             .collect()
     }
 
-    /// One simulated data set of this one's shape; `None` where a run does not complete its laps.
-    pub(super) fn simulate(&self, effects: &[Setting], seeds: Seeds) -> Option<Vec<ObservedRun>> {
-        self.simulate_at(self.places(effects), &self.setup, effects, seeds)
+    /// One simulated data set of this one's shape, as far as it is asked for; `None` where a run does not complete its laps.
+    pub(super) fn simulate(
+        &self,
+        effects: &[Setting],
+        seeds: Seeds,
+        extent: Extent,
+    ) -> Option<Vec<ObservedRun>> {
+        self.simulate_at(self.places(effects), &self.setup, effects, seeds, extent)
     }
 
     /// The same of another setup, whatever was measured unless the declared model itself changes in the course of a run.
@@ -258,8 +263,9 @@ impl Recording {
         setup: &Setup,
         effects: &[Setting],
         seeds: Seeds,
+        extent: Extent,
     ) -> Option<Vec<ObservedRun>> {
-        self.simulate_at(self.places(&[]), setup, effects, seeds)
+        self.simulate_at(self.places(&[]), setup, effects, seeds, extent)
     }
 
     fn simulate_at(
@@ -268,8 +274,14 @@ impl Recording {
         setup: &Setup,
         effects: &[Setting],
         seeds: Seeds,
+        extent: Extent,
     ) -> Option<Vec<ObservedRun>> {
-        Self::drive(setup, effects, seeds, self.shape().into_iter().zip(places))
+        let runs = match extent {
+            Extent::Whole => places.len(),
+            Extent::FirstRuns => 1,
+        };
+        let places = self.shape().into_iter().zip(places);
+        Self::drive(setup, effects, seeds, places.take(runs))
     }
 
     /// One simulated data set: so many laps of a run at each place.
@@ -311,13 +323,14 @@ impl Seeds {
     }
 }
 
-/// One simulated data set of the shape of some recordings together.
+/// One simulated data set of the shape of some recordings together, as far as it is asked for.
 pub(super) fn simulate_all(
     recordings: &[&Recording],
     effects: &[Setting],
     seeds: Seeds,
+    extent: Extent,
 ) -> Option<Vec<ObservedRun>> {
-    let parts = (recordings.iter()).map(|recording| recording.simulate(effects, seeds));
+    let parts = (recordings.iter()).map(|recording| recording.simulate(effects, seeds, extent));
     Some(parts.collect::<Option<Vec<_>>>()?.concat())
 }
 

@@ -19,10 +19,20 @@ use super::ripple::{Power, Ripples, power, wheel_sets};
 use super::summary::{BLOCKS, Summary};
 use crate::Error;
 
-/// Simulates one data set of the measured one's shape: laps of each run, or `None` where a run crashes or stops.
+/// Simulates one data set of the measured one's shape, as far as it is asked for: laps of each run, or `None` where one of these
+/// crashes or stops.
 ///
 /// The same number gives the same draws whatever the effects, so differences between effects are theirs alone.
-pub type Simulate<'a> = dyn Fn(&[Setting], u64) -> Option<Vec<ObservedRun>> + Sync + 'a;
+pub type Simulate<'a> = dyn Fn(&[Setting], u64, Extent) -> Option<Vec<ObservedRun>> + Sync + 'a;
+
+/// How much of a data set is simulated.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Extent {
+    /// Every run.
+    Whole,
+    /// The first run of every recording.
+    FirstRuns,
+}
 
 /// Data sets simulated with the declared model.
 pub(super) const NULL_SETS: u64 = 200;
@@ -59,13 +69,13 @@ pub struct Atlas {
     pub(super) spent: Spent,
 }
 
-/// A count of the data sets that a diagnosis asked for.
+/// A count of the laps that a diagnosis asked for.
 #[derive(Debug, Default)]
 pub(super) struct Spent(AtomicU64);
 
 impl Spent {
-    pub(super) fn add(&self, sets: u64) {
-        self.0.fetch_add(sets, Ordering::Relaxed);
+    pub(super) fn add(&self, laps: u64) {
+        self.0.fetch_add(laps, Ordering::Relaxed);
     }
 
     pub(super) fn count(&self) -> u64 {
@@ -82,7 +92,7 @@ impl Clone for Spent {
 impl Atlas {
     /// Changes whenever the numbers of an atlas of the same model mean something else: atlases of another recipe are not to be
     /// read.
-    pub const RECIPE: u32 = 8;
+    pub const RECIPE: u32 = 9;
 
     /// Simulates everything for one recording; `cuts` simulate the declared model with walls that another program may have
     /// cut, which is no departure from it; `alike` says whether the declared model does the same in every run, whose physics steps
@@ -120,12 +130,12 @@ impl Atlas {
         probes: Vec<Probe>,
         tick: &(dyn Fn() + Sync),
     ) -> Result<Self, Error> {
-        let ticking = |effects: &[Setting], set: u64| {
+        let ticking = |effects: &[Setting], set: u64, extent: Extent| {
             tick();
-            simulate(effects, set)
+            simulate(effects, set, extent)
         };
         let declared = |set: u64| -> Result<(Summary, Power), Error> {
-            let runs = ticking(&[], set).ok_or(Error::DeclaredModelStops)?;
+            let runs = ticking(&[], set, Extent::Whole).ok_or(Error::DeclaredModelStops)?;
             let summary = Summary::new(&runs, &[runs.len()]).ok_or(Error::TooFewLaps)?;
             Ok((summary, power(&runs)))
         };
@@ -135,7 +145,7 @@ impl Atlas {
             .into_iter()
             .unzip();
         let expectation = Expectation::of(null.iter(), alike);
-        let first = simulate(&[], 0).ok_or(Error::DeclaredModelStops)?;
+        let first = simulate(&[], 0, Extent::Whole).ok_or(Error::DeclaredModelStops)?;
         let layout = Layout::of_recording(&first, expectation.0[0].trend.len());
         let directions = directions(cuts, &null, tick);
         let mean_laps = layout.total_laps() as f64 / layout.runs() as f64;
@@ -272,7 +282,7 @@ impl Atlas {
         NULL_SETS + CUT_SETS * cuts as u64
     }
 
-    /// Number of data sets that diagnoses asked for, the atlas itself not counted.
+    /// Number of laps that diagnoses asked for, those of the atlas itself not counted.
     pub fn spent(&self) -> u64 {
         self.spent.count()
     }
@@ -321,9 +331,19 @@ impl Atlas {
     }
 
     /// The summary of one simulated data set; `None` where a run crashes.
-    pub(super) fn summary(&self, simulate: &Simulate<'_>, effects: &[Setting], set: u64) -> Option<Summary> {
-        let counts: Vec<usize> = self.layout.laps.iter().map(Vec::len).collect();
-        Summary::new(&simulate(effects, set)?, &counts)
+    pub(super) fn summary(
+        &self,
+        simulate: &Simulate<'_>,
+        effects: &[Setting],
+        set: u64,
+        extent: Extent,
+    ) -> Option<Summary> {
+        let of_extent = |laps: &Vec<usize>| match extent {
+            Extent::Whole => laps.len(),
+            Extent::FirstRuns => 1,
+        };
+        let counts: Vec<usize> = self.layout.laps.iter().map(of_extent).collect();
+        Summary::new(&simulate(effects, set, extent)?, &counts)
     }
 
     /// The difference of two expectations in units of the declared model's scatter.
@@ -351,7 +371,7 @@ fn directions(cuts: &[&Simulate<'_>], null: &[Summary], tick: &(dyn Fn() + Sync)
         let sets: Option<Vec<Summary>> = (0..CUT_SETS)
             .map(|set| {
                 tick();
-                let runs = cut(&[], set)?;
+                let runs = cut(&[], set, Extent::Whole)?;
                 Summary::new(&runs, &[runs.len()])
             })
             .collect();

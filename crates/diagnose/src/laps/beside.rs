@@ -1,7 +1,6 @@
 //! What explains best what a hypothesis leaves.
 
 use std::collections::BTreeMap;
-use std::ops::Range;
 
 use rayon::prelude::*;
 use sim::Setting;
@@ -14,6 +13,7 @@ use super::part::{Freedom, Part};
 use super::refine::Descent;
 use super::screen::{Screened, without_directions};
 use super::search::{Search, WEAK};
+use super::simulated::Draws;
 use super::trial::Trial;
 
 /// A hypothesis beside which another effect is sought.
@@ -108,23 +108,23 @@ impl Trial<'_> {
         left
     }
 
-    /// What some simulated data sets leave of the data with further settings beside a base; see [`Trial::left_beyond`]. `None`
+    /// What simulations by some draws leave of the data with further settings beside a base; see [`Trial::left_beyond`]. `None`
     /// where the robot crashes.
-    pub(super) fn left_beside(&self, base: &Base, further: &[Setting], sets: Range<u64>) -> Option<White> {
+    pub(super) fn left_beside(&self, base: &Base, further: &[Setting], draws: &Draws) -> Option<White> {
         let mut settings = base.hypothesis.settings(self.atlas);
         settings.extend_from_slice(further);
-        let found = self.simulated_briefly(&settings, sets)?;
+        let found = self.simulated_by(&settings, draws)?;
         Some(self.left_beyond(base, &found))
     }
 
-    /// The same by two groups of data sets: if these are different, products of what they leave have no noise on average.
+    /// The same by two draws: if these are different, products of what they leave have no noise on average.
     pub(super) fn left_twice(
         &self,
         base: &Base,
         further: &[Setting],
-        sets: &[Range<u64>; 2],
+        draws: &[Draws; 2],
     ) -> Option<[White; 2]> {
-        twice(sets, |sets| self.left_beside(base, further, sets))
+        twice(draws, |draws| self.left_beside(base, further, draws))
     }
 }
 
@@ -201,10 +201,10 @@ impl Search<'_> {
         const OF_ONE_EFFECT: usize = 2;
         const SHARE: f64 = 0.4;
         /// Data sets whose noise is not the same.
-        const SETS: [Range<u64>; 2] = [0..4, 4..8];
+        const DRAWS: [Draws; 2] = [Draws::Sets(0..4), Draws::Sets(4..8)];
         let probe_of = |s: &Screened| s.hypothesis.parts[0].probe;
         let spec_of = |probe: usize| self.atlas().probes[probe].spec;
-        let left = |further: &[Setting]| self.trial.left_twice(base, further, &SETS);
+        let left = |further: &[Setting]| self.trial.left_twice(base, further, &DRAWS);
         let (Some(first), Some(left_by_base)) = (screened.first(), left(&[])) else {
             return screened;
         };
@@ -225,7 +225,7 @@ impl Search<'_> {
                 let constant = screened.iter().find(constant);
                 let best = constant.and_then(|constant| {
                     let with = left(&constant.hypothesis.settings(self.atlas()))?;
-                    let (multiple, gain) = explains(&difference(&left_by_base, &with), &left_by_base);
+                    let (multiple, gain) = explains(&difference(&left_by_base, &with), &left_by_base, false);
                     let score = self.atlas().score_of_constant(probe, gain);
                     Some((multiple, score - constant.score))
                 });
@@ -278,16 +278,13 @@ impl Search<'_> {
     }
 }
 
-/// What two groups of data sets leave, which are looked at once if they are the same.
-pub(super) fn twice(
-    sets: &[Range<u64>; 2],
-    left: impl Fn(Range<u64>) -> Option<White>,
-) -> Option<[White; 2]> {
-    let first = left(sets[0].clone())?;
-    let second = if sets[0] == sets[1] {
+/// What two draws leave, which are looked at once if they are the same.
+pub(super) fn twice(draws: &[Draws; 2], left: impl Fn(&Draws) -> Option<White>) -> Option<[White; 2]> {
+    let first = left(&draws[0])?;
+    let second = if draws[0] == draws[1] {
         first.clone()
     } else {
-        left(sets[1].clone())?
+        left(&draws[1])?
     };
     Some([first, second])
 }
@@ -298,17 +295,22 @@ pub(super) fn difference(one: &[White; 2], other: &[White; 2]) -> [White; 2] {
 }
 
 /// The multiple of an action that explains most of what is left, and half the squared distance that it gains, both by two groups
-/// of data sets.
-pub(super) fn explains(action: &[White; 2], left: &[White; 2]) -> (f64, f64) {
+/// of data sets; of an odd action it may be negative.
+pub(super) fn explains(action: &[White; 2], left: &[White; 2], odd: bool) -> (f64, f64) {
     let product = 0.5 * (left[0].dot(&action[1]) + left[1].dot(&action[0]));
-    best_multiple(product, action[0].dot(&action[1]))
+    best_multiple(product, action[0].dot(&action[1]), odd)
 }
 
 /// The multiple of an action that explains most, by its product with what is to be explained and its square, and half the squared
 /// distance that it gains. It is not more than twice as much as was simulated.
-fn best_multiple(product: f64, square: f64) -> (f64, f64) {
+fn best_multiple(product: f64, square: f64, odd: bool) -> (f64, f64) {
     const MOST: f64 = 2.0;
-    let multiple = (product / square.max(f64::MIN_POSITIVE)).clamp(0.0, MOST);
+    // Noise alone may make a square negative.
+    if square <= 0.0 {
+        return (0.0, 0.0);
+    }
+    let least = if odd { -MOST } else { 0.0 };
+    let multiple = (product / square).clamp(least, MOST);
     (multiple, multiple * product - 0.5 * multiple * multiple * square)
 }
 
@@ -319,10 +321,12 @@ mod tests {
     #[test]
     fn a_multiple_is_the_vertex_of_a_parabola_within_bounds() {
         // |(3, 4) - m (2, 0)|^2 is least at m = 1.5, and 9 less than at 0.
-        assert_eq!(best_multiple(6.0, 4.0), (1.5, 4.5));
-        assert_eq!(best_multiple(20.0, 4.0), (2.0, 32.0));
-        assert_eq!(best_multiple(-1.0, 4.0), (0.0, 0.0));
-        // Noise alone may make a square negative.
-        assert_eq!(best_multiple(-1.0, -0.5).0, 0.0);
+        assert_eq!(best_multiple(6.0, 4.0, false), (1.5, 4.5));
+        assert_eq!(best_multiple(20.0, 4.0, false), (2.0, 32.0));
+        assert_eq!(best_multiple(-6.0, 4.0, false), (0.0, 0.0));
+        assert_eq!(best_multiple(-6.0, 4.0, true), (-1.5, 4.5));
+        for product in [-1.0, 1.0] {
+            assert_eq!(best_multiple(product, -0.5, true), (0.0, 0.0));
+        }
     }
 }

@@ -49,7 +49,7 @@ impl Atlas {
         watch: &Watch<'_>,
     ) -> Result<LapDiagnosis, Error> {
         let memo = Memo::new(simulate);
-        let simulate: &Simulate<'_> = &|effects, set| memo.simulate(effects, set);
+        let simulate: &Simulate<'_> = &|effects, set, extent| memo.simulate(effects, set, extent);
         let data = self.observed(runs)?;
         let residual = self.white(&data, &self.null);
         let numbers = Departures::new(&residual, &self.layout);
@@ -326,7 +326,7 @@ impl Atlas {
         effects: &[Setting],
     ) -> Result<(Departures, Option<Departures>), Error> {
         let memo = Memo::new(simulate);
-        let simulate: &Simulate<'_> = &|effects, set| memo.simulate(effects, set);
+        let simulate: &Simulate<'_> = &|effects, set, extent| memo.simulate(effects, set, extent);
         let data = self.observed(runs)?;
         let before = Departures::new(&self.white(&data, &self.null), &self.layout);
         if effects.is_empty() {

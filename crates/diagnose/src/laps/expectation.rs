@@ -44,6 +44,14 @@ impl Expectation {
         mean
     }
 
+    /// The same of so many runs of each recording, of which one is expected what another is.
+    pub(super) fn for_runs(mut self, counts: impl Iterator<Item = usize>) -> Self {
+        for (expected, count) in self.0.iter_mut().zip(counts) {
+            expected.means = vec![expected.means[0].clone(); count];
+        }
+        self
+    }
+
     fn zero(&self) -> Self {
         let zero = |v: &DVector<f64>| DVector::zeros(v.len());
         let expected = |e: &Expected| Expected {

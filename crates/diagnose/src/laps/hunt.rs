@@ -1,7 +1,5 @@
 //! The size of an effect whose action jumps with it.
 
-use std::ops::Range;
-
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use sim::Setting;
@@ -10,7 +8,7 @@ use super::atlas::{Atlas, White};
 use super::beside::{Base, twice};
 use super::hypothesis::Hypothesis;
 use super::part::Part;
-use super::simulated::FINAL_SETS;
+use super::simulated::{Draws, FINAL_SETS};
 use super::trial::Trial;
 
 /// Data sets simulated at each size, at one spacing after the other.
@@ -19,11 +17,11 @@ const CLOSER: [u64; 4] = [3, 4, 8, 8];
 /// A size of a probe that jumps about which a better one is to be found.
 #[derive(Debug, Clone)]
 pub(super) struct Hunt {
-    base: Base,
-    probe: usize,
-    size: f64,
+    pub(super) base: Base,
+    pub(super) probe: usize,
+    pub(super) size: f64,
     /// How far off it may be.
-    spacing: f64,
+    pub(super) spacing: f64,
     /// How often sizes closer to it were looked at.
     looks: usize,
     /// The squared distance of the data that it leaves, as the last look saw it; infinite before the first.
@@ -53,10 +51,6 @@ impl Hunt {
     /// The same where a scan saw what it leaves.
     pub(super) fn leaving(self, left: f64) -> Self {
         Self { left, ..self }
-    }
-
-    pub(super) fn probe(&self) -> usize {
-        self.probe
     }
 
     /// Hunts, what leaves least first.
@@ -212,19 +206,14 @@ impl Trial<'_> {
 
     /// Squared distances that a hunt leaves at some sizes, each with its size, by so many data sets.
     fn distances(&self, hunt: &Hunt, sizes: &[f64], sets: u64) -> Vec<(f64, f64)> {
-        let looks = self.looks(&hunt.base, hunt.probe, sizes, &[0..sets, 0..sets]);
+        let draws = Draws::Sets(0..sets);
+        let looks = self.looks(&hunt.base, hunt.probe, sizes, &[draws.clone(), draws]);
         looks.iter().map(|look| (look.square(), look.size)).collect()
     }
 
     /// What a hypothesis with a probe beside it leaves of the data at some sizes; those at which the robot crashes are left out.
-    pub(super) fn looks(
-        &self,
-        base: &Base,
-        probe: usize,
-        sizes: &[f64],
-        sets: &[Range<u64>; 2],
-    ) -> Vec<Look> {
-        self.looks_by(probe, sizes, |further| self.left_twice(base, further, sets))
+    pub(super) fn looks(&self, base: &Base, probe: usize, sizes: &[f64], draws: &[Draws; 2]) -> Vec<Look> {
+        self.looks_by(probe, sizes, |further| self.left_twice(base, further, draws))
     }
 
     /// The same beside nothing, at sizes that are asked for whatever the data are.
@@ -233,12 +222,12 @@ impl Trial<'_> {
         nothing: &Base,
         probe: usize,
         sizes: &[f64],
-        sets: &[Range<u64>; 2],
+        draws: &[Draws; 2],
     ) -> Vec<Look> {
         let before = self.left_beyond(nothing, &self.atlas.null);
         self.looks_by(probe, sizes, |further| {
-            twice(sets, |sets| {
-                let change = self.kept_change(further, sets)?;
+            twice(draws, |draws| {
+                let change = self.kept_change(further, draws)?;
                 Some(self.without_silent(&before - change))
             })
         })

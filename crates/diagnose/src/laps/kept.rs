@@ -1,7 +1,6 @@
 //! What settings do to the declared model that are asked for whatever the data are.
 
 use std::collections::BTreeMap;
-use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, MutexGuard};
 
@@ -9,6 +8,7 @@ use serde::{Deserialize, Serialize};
 use sim::Setting;
 
 use super::atlas::{Spent, White};
+use super::simulated::Draws;
 use super::trial::Trial;
 
 /// Actions that were simulated once and are kept with the atlas: every other data set asks for them again.
@@ -21,8 +21,8 @@ pub(super) struct Kept {
 /// What settings do, and what it took to find out.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(super) struct Action {
-    /// Data sets simulated.
-    sets: u64,
+    /// Laps simulated.
+    laps: u64,
     /// A difference as in [`White`], to seven digits; `None` where the robot crashes.
     white: Option<Vec<f32>>,
 }
@@ -73,16 +73,16 @@ impl Trial<'_> {
     /// What settings do to a data set, by the same draws; `None` where the robot crashes.
     pub(super) fn kept_action(&self, settings: &[Setting], set: u64) -> Option<White> {
         let sets = set..set + 1;
-        self.kept("same draws", settings, sets.clone(), |trial| {
+        self.kept(format!("same draws {set}"), settings, |trial| {
             let found = trial.simulated_plainly(settings, sets.clone())?;
             Some(self.atlas.white(&found, &self.atlas.declared_mean(sets)))
         })
     }
 
-    /// What settings do to the declared model's expectation, as [`Trial::simulated_briefly`] tells it.
-    pub(super) fn kept_change(&self, settings: &[Setting], sets: Range<u64>) -> Option<White> {
-        self.kept("expectation", settings, sets.clone(), |trial| {
-            let found = trial.simulated_briefly(settings, sets)?;
+    /// What settings do to the declared model's expectation, as these draws tell it.
+    pub(super) fn kept_change(&self, settings: &[Setting], draws: &Draws) -> Option<White> {
+        self.kept(format!("expectation {draws:?}"), settings, |trial| {
+            let found = trial.simulated_by(settings, draws)?;
             Some(self.atlas.white(&found, &self.atlas.null))
         })
     }
@@ -90,12 +90,10 @@ impl Trial<'_> {
     /// What is known, or else found and then known. It counts as spent each time: how often a model was traced changes no figure.
     fn kept(
         &self,
-        what: &str,
+        mut key: String,
         settings: &[Setting],
-        sets: Range<u64>,
         find: impl FnOnce(&Trial<'_>) -> Option<White>,
     ) -> Option<White> {
-        let mut key = format!("{what} {sets:?}");
         for Setting { spec, pattern } in settings {
             key += &format!(" {} {pattern:?}", spec.name);
         }
@@ -106,13 +104,13 @@ impl Trial<'_> {
                 ..*self
             });
             let action = Action {
-                sets: spent.count(),
+                laps: spent.count(),
                 white: white.map(|white| white.iter().map(|&x| x as f32).collect()),
             };
             self.atlas.kept.insert(key, action.clone());
             action
         });
-        self.spent.add(action.sets);
+        self.spent.add(action.laps);
         let numbers = action.white?;
         Some(White::from_iterator(
             numbers.len(),
@@ -128,13 +126,13 @@ mod tests {
     use sim::Pattern;
 
     use super::*;
-    use crate::laps::atlas::Atlas;
+    use crate::laps::atlas::{Atlas, Extent};
     use crate::{ObservedLap, ObservedRun};
 
     const GATES: usize = 40;
 
     /// Two runs of laps that scatter by 1 mm, where a wheel scale puts them aside by as many mm and a thousand stops the robot.
-    fn simulated(effects: &[Setting], set: u64) -> Option<Vec<ObservedRun>> {
+    fn simulated(effects: &[Setting], set: u64, extent: Extent) -> Option<Vec<ObservedRun>> {
         let aside_mm = effects.first().map_or(0.0, |effect| match &effect.pattern {
             Pattern::Constant(values) => values[0],
             _ => unreachable!(),
@@ -166,15 +164,19 @@ mod tests {
                 beginning: None,
             }
         };
-        (aside_mm < 1000.0).then(|| (0..2).map(run).collect())
+        let runs = match extent {
+            Extent::Whole => 2,
+            Extent::FirstRuns => 1,
+        };
+        (aside_mm < 1000.0).then(|| (0..runs).map(run).collect())
     }
 
     #[test]
     fn what_a_trace_asks_for_is_simulated_once_and_counts_each_time() {
         let simulations = AtomicU64::new(0);
-        let counted = |effects: &[Setting], set: u64| {
+        let counted = |effects: &[Setting], set: u64, extent: Extent| {
             simulations.fetch_add(1, Ordering::Relaxed);
-            simulated(effects, set)
+            simulated(effects, set, extent)
         };
         let made = Atlas::without_effects(&counted, &[], true, &|| ()).unwrap();
         assert!(!made.has_grown());
@@ -190,11 +192,11 @@ mod tests {
             };
             let found = (
                 trial.kept_action(&aside(2.0), 0),
-                trial.kept_change(&aside(2.0), 0..3),
+                trial.kept_change(&aside(2.0), &Draws::Sets(0..3)),
             );
             let crashed = (
                 trial.kept_action(&aside(1000.0), 0),
-                trial.kept_change(&aside(1000.0), 0..3),
+                trial.kept_change(&aside(1000.0), &Draws::Sets(0..3)),
             );
             assert_eq!(crashed, (None, None));
             (found, simulations.load(Ordering::Relaxed) - before)
@@ -209,5 +211,26 @@ mod tests {
         assert_eq!(asked(&read), (first, 0));
         assert!(!read.has_grown());
         assert_eq!(read.spent(), made.spent());
+    }
+
+    #[test]
+    fn first_runs_stand_for_all_and_count_for_themselves() {
+        let made = Atlas::without_effects(&simulated, &[], true, &|| ()).unwrap();
+        let trial = Trial {
+            atlas: &made,
+            simulate: &simulated,
+            data: &made.null,
+            silent: &[],
+            spent: &made.spent,
+        };
+        let aside = [Setting::constant(sim::find("wheel-scale").unwrap(), [2.0])];
+        let found = trial.simulated_by(&aside, &Draws::FirstRuns(7)).unwrap();
+        assert_eq!(made.spent(), 5);
+        let whole = simulated(&aside, 7, Extent::Whole).unwrap();
+        let first = made.observed(&whole).unwrap().0.remove(0).means.remove(0);
+        assert_eq!(found.0[0].means.len(), 2);
+        for mean in &found.0[0].means {
+            assert!((mean - &first).amax() < 1e-9);
+        }
     }
 }

@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use serde::{Deserialize, Serialize};
 
+use super::atlas::Extent;
 use super::beginning::BEGINNING;
 use super::observed::ObservedRun;
 use super::summary::SECOND;
@@ -54,6 +55,15 @@ impl Layout {
     /// Number of laps.
     pub(super) fn total_laps(&self) -> usize {
         self.laps.iter().flatten().sum()
+    }
+
+    /// Number of laps of so much of a data set.
+    pub(super) fn laps_of_extent(&self, extent: Extent) -> u64 {
+        let laps = match extent {
+            Extent::Whole => self.total_laps(),
+            Extent::FirstRuns => self.laps.iter().map(|laps| laps[0]).sum(),
+        };
+        laps as u64
     }
 
     /// Recording and place in it of every run.

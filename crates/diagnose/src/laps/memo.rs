@@ -5,7 +5,7 @@ use std::sync::Mutex;
 
 use sim::Setting;
 
-use super::atlas::Simulate;
+use super::atlas::{Extent, Simulate};
 use super::observed::ObservedRun;
 
 /// Data sets that are kept: a search goes on from where it was a moment ago. Of 80 laps and 100 gates they take 64 MB.
@@ -15,6 +15,7 @@ const KEPT: usize = 256;
 struct Known {
     effects: Vec<Setting>,
     set: u64,
+    extent: Extent,
     /// The laps of its runs; `None` where one crashes or stops.
     runs: Option<Vec<ObservedRun>>,
 }
@@ -35,12 +36,12 @@ impl<'a> Memo<'a> {
     }
 
     /// One data set; see [`Simulate`].
-    pub(super) fn simulate(&self, effects: &[Setting], set: u64) -> Option<Vec<ObservedRun>> {
-        let is_it = |known: &&Known| known.set == set && known.effects == effects;
+    pub(super) fn simulate(&self, effects: &[Setting], set: u64, extent: Extent) -> Option<Vec<ObservedRun>> {
+        let is_it = |known: &&Known| (known.set, known.extent) == (set, extent) && known.effects == effects;
         if let Some(known) = self.known().iter().find(is_it) {
             return known.runs.clone();
         }
-        let runs = (self.simulate)(effects, set);
+        let runs = (self.simulate)(effects, set, extent);
         let mut known = self.known();
         if known.len() == KEPT {
             known.pop_front();
@@ -48,6 +49,7 @@ impl<'a> Memo<'a> {
         known.push_back(Known {
             effects: effects.to_vec(),
             set,
+            extent,
             runs: runs.clone(),
         });
         runs
@@ -71,19 +73,21 @@ mod tests {
     #[test]
     fn the_latest_data_sets_are_simulated_once() {
         let count = AtomicU64::new(0);
-        let simulate = |_: &[Setting], set: u64| {
+        let simulate = |_: &[Setting], set: u64, _: Extent| {
             count.fetch_add(1, Ordering::Relaxed);
             (set != 3).then(Vec::new)
         };
         let memo = Memo::new(&simulate);
         let scale = |factor: f64| [Setting::constant(find("wheel-scale").unwrap(), [factor])];
+        let whole = |effects: &[Setting], set: u64| memo.simulate(effects, set, Extent::Whole);
         for _ in 0..2 {
-            assert!(memo.simulate(&scale(1.1), 1).is_some() && memo.simulate(&scale(1.1), 3).is_none());
-            assert!(memo.simulate(&scale(1.2), 1).is_some() && memo.simulate(&[], 1).is_some());
+            assert!(whole(&scale(1.1), 1).is_some() && whole(&scale(1.1), 3).is_none());
+            assert!(whole(&scale(1.2), 1).is_some() && whole(&[], 1).is_some());
+            assert!(memo.simulate(&[], 1, Extent::FirstRuns).is_some());
         }
-        assert_eq!(count.load(Ordering::Relaxed), 4);
-        (10..10 + KEPT as u64).for_each(|set| drop(memo.simulate(&[], set)));
-        memo.simulate(&scale(1.1), 1);
-        assert_eq!(count.load(Ordering::Relaxed), 4 + KEPT as u64 + 1);
+        assert_eq!(count.load(Ordering::Relaxed), 5);
+        (10..10 + KEPT as u64).for_each(|set| drop(whole(&[], set)));
+        whole(&scale(1.1), 1);
+        assert_eq!(count.load(Ordering::Relaxed), 5 + KEPT as u64 + 1);
     }
 }

@@ -53,7 +53,7 @@ mod baseline;
 mod detectable;
 mod separation;
 
-pub use atlas::{Atlas, Simulate};
+pub use atlas::{Atlas, Extent, Simulate};
 pub use baseline::Baselines;
 pub use beginning::{Beginning, MeanBeginning};
 pub use diagnosis::LapDiagnosis;

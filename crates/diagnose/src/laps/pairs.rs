@@ -11,6 +11,7 @@ use super::refine::Descent;
 use super::rounds::{ERRORS, ROUNDS_OF_SEVERAL, Rung, best_of};
 use super::screen::tangent;
 use super::search::{BASES, Found, NEARLY_ALL, STRONG, Search, of_other_effects};
+use super::simulated::Draws;
 
 /// Hypotheses of several effects that were descended from, and where that led.
 pub(super) struct Tried {
@@ -188,7 +189,9 @@ impl Search<'_> {
         let probes = [0, 1].map(|i| pair.hypothesis.parts[i].probe);
         let nothing = atlas.at_rest(Hypothesis::nothing());
         let settings = pair.hypothesis.settings(atlas);
-        let left = self.trial.left_beside(&nothing, &settings, 0..SETS)?;
+        let left = self
+            .trial
+            .left_beside(&nothing, &settings, &Draws::Sets(0..SETS))?;
         let [a, b] = [0, 1].map(|i| tangent(&atlas.nodes(probes[i]), pair.sizes[i]));
         let squares = Matrix2::new(a.norm_squared(), a.dot(&b), a.dot(&b), b.norm_squared());
         let products = Vector2::new(a.dot(&left), b.dot(&left));

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use sim::Setting;
 use statrs::statistics::{Data, OrderStatistics};
 
-use super::atlas::{Atlas, Simulate};
+use super::atlas::{Atlas, Extent, Simulate};
 use super::hypothesis::Hypothesis;
 use super::observed::ObservedRun;
 use super::part::Part;
@@ -135,7 +135,7 @@ impl Trial<'_> {
         if others.parts.is_empty() {
             return self.ripple_beyond(runs, &self.atlas.ripples);
         }
-        self.spent.add(SETS + wheel_sets(&self.atlas.probes));
+        self.spend(SETS + wheel_sets(&self.atlas.probes), Extent::Whole);
         let round = powers(self.simulate, &others.settings(self.atlas), SETS)?;
         self.ripple_beyond(runs, &self.atlas.ripples(self.simulate, others, round))
     }
@@ -189,7 +189,7 @@ impl Trial<'_> {
 fn powers(simulate: &Simulate<'_>, settings: &[Setting], sets: u64) -> Option<Vec<Power>> {
     (0..sets)
         .into_par_iter()
-        .map(|set| simulate(settings, set).map(|runs| power(&runs)))
+        .map(|set| simulate(settings, set, Extent::Whole).map(|runs| power(&runs)))
         .collect()
 }
 

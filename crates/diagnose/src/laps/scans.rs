@@ -17,6 +17,7 @@ use super::probe::Probe;
 use super::refine::Descent;
 use super::rounds::{ROUNDS_OF_SEVERAL, near};
 use super::search::{BASES, Found, Search, of_other_effects, sort};
+use super::simulated::Draws;
 use super::trial::Trial;
 use super::verdict;
 
@@ -81,7 +82,7 @@ impl Trial<'_> {
     /// crashes.
     fn scan(&self, base: &Base, probe: usize) -> Option<Scan> {
         const SETS: u64 = 3;
-        /// Excess, in units of what chance leaves, below which noise would hide which size is best.
+        /// Excess, in units of what chance leaves, below which the noise of one data set would hide which size is best.
         const LITTLE: f64 = 3.0;
         let alone = base.hypothesis.parts.is_empty();
         let without = if alone {
@@ -91,15 +92,18 @@ impl Trial<'_> {
         };
         let chance = self.atlas.layout.len() as f64;
         let excess = self.left_beyond(base, &without).norm_squared() - chance;
-        let second = if excess < LITTLE * chance { 1..2 } else { 0..1 };
-        let sets = [0..1, second];
+        let closely = || {
+            let second = if excess < LITTLE * chance { 1..2 } else { 0..1 };
+            [Draws::Sets(0..1), Draws::Sets(second)]
+        };
         let Probe { sizes, scanned, .. } = &self.atlas.probes[probe];
         let (ratio, sizes) = in_constant_ratio(sizes[0], sizes[sizes.len() - 1], *scanned);
         let sizes = self.may_explain(base, probe, sizes, excess);
         let looks = if alone {
-            self.kept_looks(base, probe, &sizes, &sets)
+            self.kept_looks(base, probe, &sizes, &closely())
         } else {
-            self.looks(base, probe, &sizes, &sets)
+            let roughly = self.rough_draws(&base.hypothesis, excess / chance);
+            self.looks(base, probe, &sizes, &roughly.unwrap_or_else(closely))
         };
         Some(Scan {
             probe,
@@ -109,6 +113,14 @@ impl Trial<'_> {
         })
     }
 
+    /// Draws that tell roughly what goes with a hypothesis that leaves so many times what chance does beyond that, unless their noise
+    /// would hide it.
+    fn rough_draws(&self, hypothesis: &Hypothesis, left: f64) -> Option<[Draws; 2]> {
+        const ENOUGH: f64 = 0.8;
+        let of_first_runs = self.atlas.are_alike(&hypothesis.settings(self.atlas));
+        (of_first_runs && left > ENOUGH).then_some([Draws::FirstRuns(0), Draws::FirstRuns(1)])
+    }
+
     /// The sizes of a probe that jumps at which it may explain a fair share of what a base leaves: it does that much beside nothing, but
     /// for what the base's numbers follow, or a few times more or less.
     fn may_explain(&self, base: &Base, probe: usize, sizes: Vec<f64>, excess: f64) -> Vec<f64> {
@@ -116,7 +128,7 @@ impl Trial<'_> {
         const OF_EXCESS: Range<f64> = 0.01..10.0;
         let may = |&size: &f64| {
             let setting = self.atlas.probes[probe].setting(size);
-            let action = self.kept_change(&[setting], 0..1);
+            let action = self.kept_change(&[setting], &Draws::Sets(0..1));
             let square = |action: White| self.atlas.beyond(base, &action).norm_squared();
             action.is_some_and(|action| OF_EXCESS.contains(&(square(action) / excess)))
         };
@@ -124,55 +136,88 @@ impl Trial<'_> {
     }
 
     /// A probe that jumps with each of those that do not, at sizes close about the one to which it came alone: the best few. What the
-    /// other does is simulated beside it, because rounding makes another thing of it.
-    fn screen_about(&self, probe: usize, size: f64, most: usize) -> Vec<Beside> {
-        const SETS: [Range<u64>; 2] = [0..2, 2..4];
-        const COUNT: u32 = 81;
+    /// other does is simulated beside it, because rounding makes another thing of it. Where the one leaves much, as a multiple of what chance
+    /// leaves, only what a rough look shows to be the best is looked at closely.
+    fn screen_about(&self, probe: usize, size: f64, left: f64, most: usize) -> Vec<Beside> {
+        const CLOSER: [Draws; 2] = [Draws::Sets(0..2), Draws::Sets(2..4)];
+        const SIZES: u32 = 81;
         /// Share of the size to either side.
         const REACH: f64 = 0.004;
-        let nothing = self.atlas.at_rest(Hypothesis::nothing());
-        let left = |settings: &[Setting]| self.left_twice(&nothing, settings, &SETS);
+        const HEARD: usize = 24;
+        let (ratio, mut sizes) = in_constant_ratio(size * (1.0 - REACH), size * (1.0 + REACH), SIZES);
+        let hunt = Hunt::new(
+            self.atlas.at_rest(Hypothesis::nothing()),
+            probe,
+            size,
+            size * (ratio - 1.0),
+        );
+        let mut others = self.atlas.smallest_sizes();
+        if let Some(draws) = self.rough_draws(&hunt.base.hypothesis, left) {
+            let mut best = self.beside_hunted(&hunt, &sizes, &others, &draws);
+            best.truncate(HEARD);
+            let is_near =
+                |size: &f64| (best.iter()).any(|best| (size - best.size).abs() < 1.5 * best.spacing);
+            sizes.retain(is_near);
+            others = best.iter().map(|best| (best.other, best.other_size)).collect();
+        }
+        let closer = self.beside_hunted(&hunt, &sizes, &others, &CLOSER);
+        self.atlas.diverse_beside(closer, most)
+    }
+
+    /// Each of other probes, with a size at which it is simulated beside one that jumps where that is hunted: both at their best, the
+    /// one that jumps at one of some sizes close about there. The best first.
+    fn beside_hunted(
+        &self,
+        hunt: &Hunt,
+        sizes: &[f64],
+        others: &[(usize, f64)],
+        draws: &[Draws; 2],
+    ) -> Vec<Beside> {
+        let &Hunt {
+            ref base,
+            probe,
+            size,
+            spacing,
+            ..
+        } = hunt;
+        let left = |settings: &[Setting]| self.left_twice(base, settings, draws);
         let jumping = self.atlas.probes[probe].setting(size);
         let Some(alone) = left(std::slice::from_ref(&jumping)) else {
             return Vec::new();
         };
-        let (ratio, sizes) = in_constant_ratio(size * (1.0 - REACH), size * (1.0 + REACH), COUNT);
-        let looks = self.looks(&nothing, probe, &sizes, &SETS);
-        let before = self.left_beyond(&nothing, &self.atlas.null).norm_squared();
+        let looks = self.looks(base, probe, sizes, draws);
+        let before = self.left_beyond(base, &self.atlas.null).norm_squared();
         let best_about = |&(other, other_size): &(usize, f64)| {
             let beside = left(&[jumping.clone(), self.atlas.probes[other].setting(other_size)])?;
             let action = difference(&alone, &beside);
             let at_look = |look: &Look| {
-                let (multiple, gain) = explains(&action, &look.left);
+                let (multiple, gain) = explains(&action, &look.left, self.atlas.probes[other].odd);
+                let gained = 0.5 * (before - look.square()) + gain;
                 Beside {
-                    score: self
-                        .atlas
-                        .score_of_pair([probe, other], 0.5 * (before - look.square()) + gain),
+                    score: self.atlas.score_of_pair([probe, other], gained),
                     other,
                     other_size: self.atlas.probes[other].times(other_size, multiple),
                     jumping: probe,
                     size: look.size,
-                    spacing: look.size * (ratio - 1.0),
+                    spacing,
                 }
             };
-            looks
-                .iter()
-                .map(at_look)
-                .max_by(|a, b| a.score.total_cmp(&b.score))
+            let at_looks = looks.iter().map(at_look);
+            at_looks.max_by(|a, b| a.score.total_cmp(&b.score))
         };
-        let mut all: Vec<Beside> = (self.atlas.smallest_sizes().par_iter())
-            .filter_map(best_about)
-            .collect();
+        let mut all: Vec<Beside> = others.par_iter().filter_map(best_about).collect();
         all.sort_by(|a, b| b.score.total_cmp(&a.score));
-        self.atlas.diverse_beside(all, most)
+        all
     }
 }
 
 impl Atlas {
-    /// Every probe that does not jump at its smallest sizes.
+    /// Every probe that does not jump at its smallest sizes; to one side alone where the other does the opposite.
     fn smallest_sizes(&self) -> Vec<(usize, f64)> {
         let of_probe = |number: usize| {
-            let sizes = self.probes[number].smallest_sizes().into_iter();
+            let probe = &self.probes[number];
+            let sides = if probe.odd { 1 } else { 2 };
+            let sizes = probe.smallest_sizes().into_iter().take(sides);
             sizes.map(move |size| (number, size))
         };
         (0..self.probes.len())
@@ -326,7 +371,10 @@ impl Search<'_> {
         match single.hypothesis.parts.as_slice() {
             [part] if part.held.is_some() => {
                 self.tell(format_args!("sizes about that of {}", single.explanation.label()));
-                let screened = (self.trial).screen_about(part.probe, part.mean_size(self.atlas()), HEARD);
+                let left = self.excess(&single.residual) / self.chance();
+                let screened = self
+                    .trial
+                    .screen_about(part.probe, part.mean_size(self.atlas()), left, HEARD);
                 self.pairs_that_jump(&self.hunts_of_pairs(&screened))
             }
             _ => Vec::new(),
@@ -432,7 +480,7 @@ impl Search<'_> {
         for single in (of_other_effects(singles.filter(near)).into_iter()).take(BASES) {
             // What jumps beside the best does so beside the others.
             let best = hunts.iter().min_by(|a, b| a.left.total_cmp(&b.left));
-            let probe = best.map(Hunt::probe);
+            let probe = best.map(|best| best.probe);
             let probes = self
                 .jumping()
                 .filter(|&other| probe.is_none_or(|probe| probe == other));

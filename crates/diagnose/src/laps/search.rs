@@ -37,7 +37,7 @@ pub(super) struct Found {
     /// What it leaves of the data, in units of the declared model's scatter.
     pub(super) left: White,
     /// The same in units of its own scatter and of the simulation's error.
-    residual: White,
+    pub(super) residual: White,
 }
 
 /// A search for explanations of one data set.

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 use sim::Setting;
 
-use super::atlas::{Simulate, White, white};
+use super::atlas::{Extent, Simulate, White, white};
 use super::expectation::{Expectation, Scatter};
 use super::layout::Layout;
 use super::summary::Summary;
@@ -32,7 +32,7 @@ pub fn separations(
 ) -> Option<Vec<Option<f64>>> {
     let declared = simulated(simulate, &[])?;
     let answered = simulated(simulate, answer)?;
-    let first = simulate(answer, 0)?;
+    let first = simulate(answer, 0, Extent::Whole)?;
     let layout = Layout::of_recording(&first, answered[0].0[0].scatter.nrows());
     let other = Scatter::of_few(declared.iter().map(|summary| &summary.0[0]))?;
     let scatter = [Scatter::near(
@@ -65,7 +65,7 @@ fn simulated(simulate: &Simulate<'_>, effects: &[Setting]) -> Option<Vec<Summary
     (0..SETS)
         .into_par_iter()
         .map(|set| {
-            let runs = simulate(effects, set)?;
+            let runs = simulate(effects, set, Extent::Whole)?;
             Summary::new(&runs, &[runs.len()])
         })
         .collect()

@@ -5,7 +5,7 @@ use std::ops::Range;
 use rayon::prelude::*;
 use sim::Setting;
 
-use super::atlas::{Atlas, Simulate, Spent, White};
+use super::atlas::{Atlas, Extent, Simulate, Spent, White};
 use super::expectation::Expectation;
 use super::hypothesis::Hypothesis;
 use super::likelihood::Doubt;
@@ -14,6 +14,15 @@ use super::trial::Trial;
 
 /// Data sets simulated of a hypothesis that is judged.
 pub(super) const FINAL_SETS: u64 = 32;
+
+/// Data sets by which something is looked at.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) enum Draws {
+    /// These, or as few of them as make it as good with the control variate of [`Trial::evaluate`].
+    Sets(Range<u64>),
+    /// Of one the first run of every recording, for all its runs where they are alike: a rough look in a fraction of the time.
+    FirstRuns(u64),
+}
 
 /// A hypothesis simulated.
 #[derive(Debug, Clone)]
@@ -62,7 +71,29 @@ impl Trial<'_> {
         Some(Expectation::of(summaries.iter(), self.atlas.alike))
     }
 
-    /// The same by as few of the data sets as make it as good with the control variate of [`Trial::evaluate`].
+    /// What these draws tell of settings.
+    pub(super) fn simulated_by(&self, settings: &[Setting], draws: &Draws) -> Option<Expectation> {
+        match draws {
+            Draws::Sets(sets) => self.simulated_briefly(settings, sets.clone()),
+            Draws::FirstRuns(set) if self.atlas.are_alike(settings) => {
+                self.spend(1, Extent::FirstRuns);
+                let summary = self
+                    .atlas
+                    .summary(self.simulate, settings, *set, Extent::FirstRuns)?;
+                let first = Expectation::of(std::iter::once(&summary), true);
+                Some(first.for_runs(self.atlas.layout.laps.iter().map(Vec::len)))
+            }
+            &Draws::FirstRuns(set) => self.simulated_briefly(settings, set..set + 1),
+        }
+    }
+
+    /// Counts so many data sets as simulated.
+    pub(super) fn spend(&self, sets: u64, extent: Extent) {
+        self.spent.add(sets * self.atlas.layout.laps_of_extent(extent));
+    }
+
+    /// The mean of data sets as [`Trial::simulated_plainly`] tells it, by as few of them as make it as good with the control variate
+    /// of [`Trial::evaluate`].
     pub(super) fn simulated_briefly(&self, settings: &[Setting], sets: Range<u64>) -> Option<Expectation> {
         let alike = self.atlas.are_alike(settings);
         // How runs differ that should be alike tells what draws do, or else how data sets do.
@@ -90,12 +121,12 @@ impl Trial<'_> {
         /// Share of the data sets that must be whole.
         const ENOUGH: f64 = 0.75;
         let sets = self.atlas.enough(FINAL_SETS, 1);
-        self.spent.add(sets);
+        self.spend(sets, Extent::Whole);
         let found: Vec<(Summary, &Expectation)> = (0..sets)
             .into_par_iter()
             .filter_map(|set| {
                 Some((
-                    self.atlas.summary(self.simulate, effects, set)?,
+                    self.atlas.summary(self.simulate, effects, set, Extent::Whole)?,
                     &self.atlas.samples[set as usize],
                 ))
             })
@@ -165,14 +196,14 @@ impl Atlas {
         sets: Range<u64>,
         spent: &Spent,
     ) -> Option<Vec<Summary>> {
-        spent.add(sets.end - sets.start);
+        spent.add((sets.end - sets.start) * self.layout.laps_of_extent(Extent::Whole));
         sets.into_par_iter()
-            .map(|set| self.summary(simulate, settings, set))
+            .map(|set| self.summary(simulate, settings, set, Extent::Whole))
             .collect()
     }
 
     /// Whether the declared model with these effects does the same in every run.
-    fn are_alike(&self, settings: &[Setting]) -> bool {
+    pub(super) fn are_alike(&self, settings: &[Setting]) -> bool {
         self.alike && settings.iter().all(Setting::same_in_every_run)
     }
 

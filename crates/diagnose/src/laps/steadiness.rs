@@ -3,7 +3,7 @@
 use nalgebra::DVector;
 use rayon::prelude::*;
 
-use super::atlas::Atlas;
+use super::atlas::{Atlas, Extent};
 use super::expectation::Expectation;
 use super::hypothesis::Hypothesis;
 use super::observed::{ObservedLap, ObservedRun};
@@ -47,10 +47,10 @@ impl Trial<'_> {
     pub(super) fn settling(&self, runs: &Runs, hypothesis: &Hypothesis, part: usize) -> Option<Settling> {
         let settings = hypothesis.settings(self.atlas);
         let others = hypothesis.without(part).settings(self.atlas);
-        self.spent.add(SETS);
+        self.spend(SETS, Extent::Whole);
         let with: Vec<Vec<ObservedRun>> = (0..SETS)
             .into_par_iter()
-            .map(|set| (self.simulate)(&settings, set))
+            .map(|set| (self.simulate)(&settings, set, Extent::Whole))
             .collect::<Option<_>>()?;
         let without = if others.is_empty() {
             self.atlas.declared_mean(0..SETS)
