@@ -197,7 +197,10 @@ impl Search<'_> {
                 }
             }
         }
-        let mut descents = self.descend(starts.iter(), &ROUNDS, best);
+        // The other effects of several explain nearly all wherever the sensor is.
+        let several = found.first().is_some_and(|best| best.hypothesis.parts.len() > 1);
+        let rounds: &[Rung] = if several { &ROUNDS_BESIDE } else { &ROUNDS };
+        let mut descents = self.descend(starts.iter(), rounds, best);
         descents.retain(|descent| descent.score > best - BEHIND.max(ERRORS * descent.score_error));
         self.settle(descents)
     }
