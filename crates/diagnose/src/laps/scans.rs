@@ -143,7 +143,7 @@ impl Trial<'_> {
         const SIZES: u32 = 81;
         /// Share of the size to either side.
         const REACH: f64 = 0.004;
-        const HEARD: usize = 24;
+        const CLOSELY: usize = 24;
         let (ratio, mut sizes) = in_constant_ratio(size * (1.0 - REACH), size * (1.0 + REACH), SIZES);
         let hunt = Hunt::new(
             self.atlas.at_rest(Hypothesis::nothing()),
@@ -154,7 +154,7 @@ impl Trial<'_> {
         let mut others = self.atlas.smallest_sizes();
         if let Some(draws) = self.rough_draws(&hunt.base.hypothesis, left) {
             let mut best = self.beside_hunted(&hunt, &sizes, &others, &draws);
-            best.truncate(HEARD);
+            best.truncate(CLOSELY);
             let is_near =
                 |size: &f64| (best.iter()).any(|best| (size - best.size).abs() < 1.5 * best.spacing);
             sizes.retain(is_near);
