@@ -276,10 +276,7 @@ impl Recording {
         seeds: Seeds,
         extent: Extent,
     ) -> Option<Vec<ObservedRun>> {
-        let runs = match extent {
-            Extent::Whole => places.len(),
-            Extent::FirstRuns => 1,
-        };
+        let runs = extent.runs(places.len());
         let places = self.shape().into_iter().zip(places);
         Self::drive(setup, effects, seeds, places.take(runs))
     }

@@ -34,6 +34,16 @@ pub enum Extent {
     FirstRuns,
 }
 
+impl Extent {
+    /// How many of so many runs of a recording it is.
+    pub fn runs(self, of: usize) -> usize {
+        match self {
+            Self::Whole => of,
+            Self::FirstRuns => of.min(1),
+        }
+    }
+}
+
 /// Data sets simulated with the declared model.
 pub(super) const NULL_SETS: u64 = 200;
 
@@ -338,11 +348,8 @@ impl Atlas {
         set: u64,
         extent: Extent,
     ) -> Option<Summary> {
-        let of_extent = |laps: &Vec<usize>| match extent {
-            Extent::Whole => laps.len(),
-            Extent::FirstRuns => 1,
-        };
-        let counts: Vec<usize> = self.layout.laps.iter().map(of_extent).collect();
+        let counts = self.layout.laps.iter().map(|laps| extent.runs(laps.len()));
+        let counts: Vec<usize> = counts.collect();
         Summary::new(&simulate(effects, set, extent)?, &counts)
     }
 

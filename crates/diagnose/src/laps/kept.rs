@@ -164,10 +164,7 @@ mod tests {
                 beginning: None,
             }
         };
-        let runs = match extent {
-            Extent::Whole => 2,
-            Extent::FirstRuns => 1,
-        };
+        let runs = extent.runs(2) as u64;
         (aside_mm < 1000.0).then(|| (0..runs).map(run).collect())
     }
 

@@ -59,11 +59,8 @@ impl Layout {
 
     /// Number of laps of so much of a data set.
     pub(super) fn laps_of_extent(&self, extent: Extent) -> u64 {
-        let laps = match extent {
-            Extent::Whole => self.total_laps(),
-            Extent::FirstRuns => self.laps.iter().map(|laps| laps[0]).sum(),
-        };
-        laps as u64
+        let runs = |laps: &Vec<usize>| laps[..extent.runs(laps.len())].iter().sum::<usize>();
+        self.laps.iter().map(runs).sum::<usize>() as u64
     }
 
     /// Recording and place in it of every run.

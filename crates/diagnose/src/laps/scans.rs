@@ -48,9 +48,13 @@ pub(super) struct Beside {
 impl Beside {
     /// Whether another has the same effect that jumps at about the same size.
     fn is_about(&self, other: &Self) -> bool {
+        self.jumping == other.jumping && (self.is_at_about(other.size) || other.is_at_about(self.size))
+    }
+
+    /// Whether its effect that jumps has about a size.
+    fn is_at_about(&self, size: f64) -> bool {
         const SPACINGS: f64 = 1.5;
-        self.jumping == other.jumping
-            && (self.size - other.size).abs() < SPACINGS * self.spacing.max(other.spacing)
+        (self.size - size).abs() < SPACINGS * self.spacing
     }
 }
 
@@ -155,9 +159,7 @@ impl Trial<'_> {
         if let Some(draws) = self.rough_draws(&hunt.base.hypothesis, left) {
             let mut best = self.beside_hunted(&hunt, &sizes, &others, &draws);
             best.truncate(CLOSELY);
-            let is_near =
-                |size: &f64| (best.iter()).any(|best| (size - best.size).abs() < 1.5 * best.spacing);
-            sizes.retain(is_near);
+            sizes.retain(|&size| best.iter().any(|best| best.is_at_about(size)));
             others = best.iter().map(|best| (best.other, best.other_size)).collect();
         }
         let closer = self.beside_hunted(&hunt, &sizes, &others, &CLOSER);
