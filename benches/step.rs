@@ -1,5 +1,6 @@
 //! One control step of both controllers against 15 to 1000 segments, with one ray per sensor and with many; with effects
-//! that drift; and what it costs to cut a circuit and to make a variant of it.
+//! that drift; what it costs to cut a circuit and to make a variant of it; and twenty laps with draws that are made in their
+//! course, or were made before.
 
 mod ground;
 
@@ -8,7 +9,7 @@ use std::sync::Arc;
 
 use criterion::Criterion;
 use ground::{braitenberg, circuit, model, rule_based};
-use sim::{Beam, Circuit, Combine, Model, Pattern, Run, Scene, Setting, Streams, max_error_for};
+use sim::{Beam, Circuit, Combine, Draws, Model, Pattern, Run, Scene, Setting, Streams, Tape, max_error_for};
 
 fn main() {
     let mut criterion = Criterion::default().configure_from_args();
@@ -69,6 +70,7 @@ fn main() {
             &drifting,
         );
     }
+    laps(&mut criterion, &circuit);
     criterion.final_summary();
 }
 
@@ -91,4 +93,25 @@ fn step(criterion: &mut Criterion, name: &str, circuit: &Arc<Circuit>, model: &M
     let world = scene.world(model, 0).expect("no effects, no error");
     let mut run = Run::new(&world, Streams { seed: 1, run: 0 }).expect("no effects, no error");
     criterion.bench_function(name, |bencher| bencher.iter(|| black_box(run.step())));
+}
+
+/// Twenty laps with fresh draws and from a tape, and the tape itself.
+fn laps(criterion: &mut Criterion, circuit: &Arc<Circuit>) {
+    const LAPS: usize = 20;
+    let declared = model(braitenberg(), 0.005);
+    let scene =
+        Scene::new(Arc::clone(circuit), &declared, None).expect("the shipped model fits the shipped world");
+    let world = scene.world(&declared, 0).expect("no effects, no error");
+    let streams = Streams { seed: 1, run: 0 };
+    let tape = Tape::new(&world, streams, LAPS);
+    let mut time = |name: &str, draws: Draws<'_>| {
+        criterion.bench_function(name, |bencher| {
+            bencher.iter(|| sim::drive(&world, black_box(draws), LAPS, |_| ()))
+        });
+    };
+    time("laps/fresh", streams.into());
+    time("laps/taped", (&tape).into());
+    criterion.bench_function("laps/tape", |bencher| {
+        bencher.iter(|| Tape::new(&world, black_box(streams), LAPS));
+    });
 }

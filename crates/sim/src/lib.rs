@@ -22,6 +22,7 @@ mod outlook;
 mod robot;
 mod run;
 mod sensor;
+mod tape;
 mod walls;
 mod world;
 
@@ -40,6 +41,7 @@ pub use outlook::{Look, Outlook};
 pub use robot::{Pose, Robot, Twist, WheelSpeeds};
 pub use run::{Drive, Run, Start, Step, drive, drive_from};
 pub use sensor::{Beam, Combine, Mount, ReadingNoise, Readings, Response};
+pub use tape::{Draws, Tape};
 pub use track::Vec2;
 pub use walls::{WallPlace, Walls};
 pub use world::{Circuit, Scene, World};

@@ -46,7 +46,7 @@ impl Stream {
     }
 
     /// A draw from the standard normal distribution.
-    #[inline]
+    #[inline(always)]
     pub fn normal(&mut self) -> f64 {
         rand_distr::Distribution::sample(&rand_distr::StandardNormal, &mut self.0)
     }

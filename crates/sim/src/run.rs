@@ -7,8 +7,8 @@ use crate::cast::LANES;
 #[cfg(test)]
 use crate::effects::Hook;
 use crate::effects::Moment;
-use crate::noise::{Stream, Streams};
 use crate::sensor::Combine;
+use crate::tape::{Draws, Played};
 use crate::world::World;
 use crate::{Error, Machine, Pose, Readings, WheelSpeeds};
 
@@ -45,9 +45,9 @@ pub struct Run<'w> {
     next_gate: usize,
     stretch: u64,
     contacts: u64,
-    slip: Stream,
-    sense: Stream,
-    camera: Stream,
+    slip: Played<'w>,
+    sense: Played<'w>,
+    camera: Played<'w>,
 }
 
 impl<'w> Run<'w> {
@@ -55,8 +55,8 @@ impl<'w> Run<'w> {
     ///
     /// # Errors
     /// An effect without values for this run.
-    pub fn new(world: &'w World<'w>, streams: Streams) -> Result<Self, Error> {
-        Self::from_start(world, streams, None)
+    pub fn new(world: &'w World<'w>, draws: impl Into<Draws<'w>>) -> Result<Self, Error> {
+        Self::from_start(world, draws, None)
     }
 
     /// A robot that starts on a given gate, if one is given, beside its centre and turned as [`Run::new`] would have it. Each lap
@@ -64,13 +64,19 @@ impl<'w> Run<'w> {
     ///
     /// # Errors
     /// As [`Run::new`].
-    pub fn from_start(world: &'w World<'w>, streams: Streams, start: Option<Start>) -> Result<Self, Error> {
-        let mut draws = streams.open("start");
+    pub fn from_start(
+        world: &'w World<'w>,
+        draws: impl Into<Draws<'w>>,
+        start: Option<Start>,
+    ) -> Result<Self, Error> {
+        let draws = draws.into();
+        let [slip, sense, camera] = draws.of_steps();
+        let mut at_start = draws.streams().open("start");
         let gates = &world.circuit().gates;
-        let drawn = draws.index(gates.len());
+        let drawn = at_start.index(gates.len());
         let (offset_m, turn_rad) = (
-            world.rules().start_offset_m * draws.symmetric(),
-            world.rules().start_heading_rad * draws.symmetric(),
+            world.rules().start_offset_m * at_start.symmetric(),
+            world.rules().start_heading_rad * at_start.symmetric(),
         );
         let Start { gate, time_s } = start.unwrap_or(Start {
             gate: drawn,
@@ -92,9 +98,9 @@ impl<'w> Run<'w> {
             next_gate: gate,
             stretch: (to_lap(drawn) as u64).wrapping_sub(to_lap(gate) as u64),
             contacts: 0,
-            slip: streams.open("slip"),
-            sense: streams.open("sense"),
-            camera: streams.open("camera"),
+            slip,
+            sense,
+            camera,
         };
         run.pass_gate();
         Ok(run)
@@ -153,7 +159,7 @@ impl<'w> Run<'w> {
     fn observe(&mut self, now: &Moment) -> Vec2 {
         let seen = self.apparatus.effects.observed(now, now.pose.position);
         let noise_m = self.apparatus.machine.camera_noise_m;
-        let (x, y) = (self.camera.normal(), self.camera.normal());
+        let [x, y] = self.camera.normals();
         seen + Vec2::new(x, y) * noise_m
     }
 
@@ -161,7 +167,7 @@ impl<'w> Run<'w> {
     #[inline]
     fn sense(&mut self, now: &Moment) -> Readings {
         // Drawn first: the processor casts the rays meanwhile.
-        let normals: Readings = std::array::from_fn(|_| self.sense.normal());
+        let normals: Readings = self.sense.normals();
         let mut readings = self.responses();
         let machine = &self.apparatus.machine;
         self.apparatus.effects.readings(now, machine, &mut readings);
@@ -256,7 +262,7 @@ impl<'w> Run<'w> {
     fn ground(&mut self, now: &Moment) -> WheelSpeeds {
         let effects = &mut self.apparatus.effects;
         let wheels = effects.drive(now, now.command);
-        let draws = effects.slip([self.slip.symmetric(), self.slip.symmetric()]);
+        let draws = effects.slip(self.slip.symmetrics());
         let level = self.apparatus.machine.slip_level;
         let slipping = WheelSpeeds {
             left_m_s: wheels.left_m_s * (1.0 + level * draws[0]),
@@ -327,27 +333,27 @@ pub struct Drive {
 ///
 /// # Errors
 /// An effect without values for this run.
-pub fn drive(
-    world: &World<'_>,
-    streams: Streams,
+pub fn drive<'w>(
+    world: &'w World<'w>,
+    draws: impl Into<Draws<'w>>,
     laps: usize,
     record: impl FnMut(&Step),
 ) -> Result<Drive, Error> {
-    drive_from(world, streams, None, laps, record)
+    drive_from(world, draws, None, laps, record)
 }
 
 /// [`drive`] from a given start, if one is given.
 ///
 /// # Errors
 /// As [`drive`].
-pub fn drive_from(
-    world: &World<'_>,
-    streams: Streams,
+pub fn drive_from<'w>(
+    world: &'w World<'w>,
+    draws: impl Into<Draws<'w>>,
     start: Option<Start>,
     laps: usize,
     mut record: impl FnMut(&Step),
 ) -> Result<Drive, Error> {
-    let mut run = Run::from_start(world, streams, start)?;
+    let mut run = Run::from_start(world, draws, start)?;
     let mut tracker = LapTracker::new(&world.circuit().gates, world.rules().way);
     let mut done: Vec<Lap> = Vec::with_capacity(laps + 1);
     let patience_s = world.rules().patience_laps * world.nominal_lap_s();
@@ -386,6 +392,7 @@ const SPARE_STEPS: usize = 8;
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Streams;
     use crate::effects::testing::{declared, scene};
 
     const LAPS: usize = 3;

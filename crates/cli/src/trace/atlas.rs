@@ -27,15 +27,6 @@ fn with_simulations<R>(
     use_them(&declared, &cuts)
 }
 
-/// Laps simulated for a diagnosis; those of a cached atlas count as if they were simulated now.
-pub(super) fn laps_simulated(recordings: &[Recording], atlas: &Atlas, purpose: Purpose) -> u64 {
-    let for_atlas = |recording: &Recording| {
-        let sets = purpose.sets(recording.cuts.len());
-        sets * recording.shape().iter().sum::<usize>() as u64
-    };
-    atlas.spent() + recordings.iter().map(for_atlas).sum::<u64>()
-}
-
 /// What an atlas is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Purpose {
@@ -46,7 +37,7 @@ pub(super) enum Purpose {
 }
 
 impl Purpose {
-    /// Data sets simulated for it with so many other cuts of the walls.
+    /// Data sets simulated for it at most with so many other cuts of the walls.
     fn sets(self, cuts: usize) -> u64 {
         match self {
             Self::Name => Atlas::sets(cuts),

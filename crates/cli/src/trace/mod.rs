@@ -15,6 +15,7 @@ mod pages;
 mod pictures;
 mod recording;
 mod remarks;
+mod tapes;
 mod unnamed;
 
 use std::path::Path;
@@ -23,7 +24,7 @@ use anyhow::Result;
 use diagnose::{Answer, Baselines, Decided, Departures, Detectable, Verdict};
 
 use answer::{FromLogs, TracedLaps};
-use atlas::{Purpose, laps_simulated};
+use atlas::Purpose;
 use beginnings::only_beginnings_depart;
 pub(crate) use cache::Cache;
 pub(crate) use curves::{gates_csv, starts_csv};
@@ -135,10 +136,9 @@ impl Trace {
                 remarks.push(decide_in_words(&found.logs.decide, &recordings));
             }
         }
-        let laps_simulated = laps_simulated(&recordings, &traced.atlas, purpose);
         let mut trace = Self {
             remarks,
-            laps_simulated,
+            laps_simulated: traced.atlas.spent(),
             experiments: Vec::new(),
             recordings,
             errors,

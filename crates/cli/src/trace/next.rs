@@ -7,6 +7,7 @@ use sim::{Controller, Setting, Stage, Step, Streams};
 use super::Trace;
 use super::answer::rivals;
 use super::recording::{Recording, RunPlace, Seeds};
+use super::tapes::Tapes;
 use crate::config::Config;
 use crate::interrupt;
 use crate::setup::Setup;
@@ -179,7 +180,7 @@ fn by_laps(
             begins: true,
         };
         let runs = (0..RUNS).map(|run| (LAPS, anywhere(run)));
-        Recording::drive(setup, effects, Seeds { session: seed, set }, runs)
+        Recording::drive(setup, effects, Seeds { session: seed, set }, &Tapes::NONE, runs)
     };
     let rivals: Vec<Rival> = (others.iter())
         .map(|other| Rival {

@@ -4,11 +4,12 @@ use std::path::Path;
 
 use anyhow::{Context, Result, ensure};
 use diagnose::{Extent, ObservedRun, Unseen, coarse_unit_m};
-use sim::{Setting, Start, Step, Streams, Vec2, World};
+use sim::{Draws, Setting, Start, Step, Streams, Vec2, World};
 use track::Lap;
 
 use super::beginnings::Beginnings;
 use super::checks::{belongs, is_timed};
+use super::tapes::Tapes;
 use crate::config::{Config, ModelFile};
 use crate::dataset::{DataSet, RunFile};
 use crate::interrupt;
@@ -34,6 +35,7 @@ pub(crate) struct Recording {
     pub(super) world: String,
     /// Its first run's number among those of all recordings.
     pub(super) first_run: usize,
+    tapes: Tapes,
 }
 
 /// A run to be simulated.
@@ -57,16 +59,16 @@ impl RunPlace<'_> {
     ///
     /// # Errors
     /// An effect without values for this run.
-    pub(super) fn drive(
+    pub(super) fn drive<'w>(
         &self,
         setup: &Setup,
-        world: &World<'_>,
-        streams: Streams,
+        world: &'w World<'w>,
+        draws: impl Into<Draws<'w>>,
         laps: usize,
     ) -> Result<(Vec<Lap>, SeenPath), sim::Error> {
         let mut path = Vec::new();
         let record = |step: &Step| path.push((step.time_s, step.observed));
-        let mut closed = sim::drive_from(world, streams, self.start, laps, record)?.laps;
+        let mut closed = sim::drive_from(world, draws, self.start, laps, record)?.laps;
         closed.retain(|lap| lap.missed.is_empty());
         if let Some(unseen) = self.unseen {
             closed = setup.seen_through(unseen, closed, &mut path);
@@ -95,6 +97,8 @@ impl Recording {
         world: Option<&Path>,
         sets: Vec<DataSet>,
     ) -> Result<Vec<Self>> {
+        /// Memory for draws that simulations share.
+        const TAPE_BYTES: usize = 128 << 20;
         let mut recordings: Vec<Self> = Vec::with_capacity(sets.len());
         for mut set in sets {
             let (first_run, name) = (runs(&recordings).count(), set.name.clone());
@@ -115,6 +119,12 @@ impl Recording {
                 );
             }
             recordings.push(next);
+        }
+        let share = TAPE_BYTES / recordings.len().max(1);
+        for recording in &mut recordings {
+            let Setup { scene, model } = &recording.setup;
+            let world = scene.world(model, recording.first_run)?;
+            recording.tapes = Tapes::new(&world, &recording.shape(), share);
         }
         Ok(recordings)
     }
@@ -159,6 +169,7 @@ impl Recording {
             })
             .collect();
         Ok(Self {
+            tapes: Tapes::NONE,
             unseen: unseen(&measured, setup.model.run.control_step_s),
             beginnings: Beginnings::of(&measured, &setup),
             written_m,
@@ -278,7 +289,7 @@ impl Recording {
     ) -> Option<Vec<ObservedRun>> {
         let runs = extent.runs(places.len());
         let places = self.shape().into_iter().zip(places);
-        Self::drive(setup, effects, seeds, places.take(runs))
+        Self::drive(setup, effects, seeds, &self.tapes, places.take(runs))
     }
 
     /// One simulated data set: so many laps of a run at each place.
@@ -286,6 +297,7 @@ impl Recording {
         setup: &Setup,
         effects: &[Setting],
         seeds: Seeds,
+        tapes: &Tapes,
         runs: impl Iterator<Item = (usize, RunPlace<'a>)>,
     ) -> Option<Vec<ObservedRun>> {
         if interrupt::check().is_err() {
@@ -295,11 +307,8 @@ impl Recording {
         model.effects.extend_from_slice(effects);
         let run = |(run, (laps, place)): (usize, (usize, RunPlace<'_>))| {
             let world = setup.scene.world(&model, place.number).ok()?;
-            let streams = Streams {
-                seed: seeds.of_fit(),
-                run: run as u64,
-            };
-            let (closed, path) = place.drive(setup, &world, streams, laps).ok()?;
+            let draws = tapes.draws(&world, seeds, run, laps);
+            let (closed, path) = place.drive(setup, &world, draws, laps).ok()?;
             (closed.len() == laps).then(|| place.observed(setup, closed, &path))
         };
         runs.enumerate().map(run).collect()
@@ -314,9 +323,12 @@ pub(super) struct Seeds {
 }
 
 impl Seeds {
-    /// Data sets of a fit have seeds of their own, far from those that a user's `drive` has.
-    fn of_fit(self) -> u64 {
-        (self.session << 20) + (1 << 50) + self.set
+    /// The streams of a run. Data sets of a fit have seeds of their own, far from those that a user's `drive` has.
+    pub(super) fn streams(self, run: usize) -> Streams {
+        Streams {
+            seed: (self.session << 20) + (1 << 50) + self.set,
+            run: run as u64,
+        }
     }
 }
 

@@ -47,8 +47,9 @@ impl Extent {
 /// Data sets simulated with the declared model.
 pub(super) const NULL_SETS: u64 = 200;
 
-/// Data sets simulated for each size of a probe.
+/// Data sets simulated for each size of a probe at most, and the variance, in data sets' own, that fewer are enough for.
 const PATH_SETS: u64 = 3;
+const PATH_ERROR: f64 = 0.12;
 
 /// Data sets simulated for each other way to cut the walls.
 const CUT_SETS: u64 = 8;
@@ -76,6 +77,8 @@ pub struct Atlas {
     pub(super) ripples: Ripples,
     /// What screens asked for.
     pub(super) kept: Kept,
+    /// Laps that were simulated to make it.
+    made: u64,
     pub(super) spent: Spent,
 }
 
@@ -102,7 +105,7 @@ impl Clone for Spent {
 impl Atlas {
     /// Changes whenever the numbers of an atlas of the same model mean something else: atlases of another recipe are not to be
     /// read.
-    pub const RECIPE: u32 = 9;
+    pub const RECIPE: u32 = 10;
 
     /// Simulates everything for one recording; `cuts` simulate the declared model with walls that another program may have
     /// cut, which is no departure from it; `alike` says whether the declared model does the same in every run, whose physics steps
@@ -140,8 +143,13 @@ impl Atlas {
         probes: Vec<Probe>,
         tick: &(dyn Fn() + Sync),
     ) -> Result<Self, Error> {
-        let ticking = |effects: &[Setting], set: u64, extent: Extent| {
+        let simulated = AtomicU64::new(0);
+        let counting = || {
+            simulated.fetch_add(1, Ordering::Relaxed);
             tick();
+        };
+        let ticking = |effects: &[Setting], set: u64, extent: Extent| {
+            counting();
             simulate(effects, set, extent)
         };
         let declared = |set: u64| -> Result<(Summary, Power), Error> {
@@ -157,7 +165,7 @@ impl Atlas {
         let expectation = Expectation::of(null.iter(), alike);
         let first = simulate(&[], 0, Extent::Whole).ok_or(Error::DeclaredModelStops)?;
         let layout = Layout::of_recording(&first, expectation.0[0].trend.len());
-        let directions = directions(cuts, &null, tick);
+        let directions = directions(cuts, &null, &counting);
         let mean_laps = layout.total_laps() as f64 / layout.runs() as f64;
         let scatter = Scatter::of(null.iter().map(|summary| &summary.0[0]))
             .and_then(|scatter| scatter.left_open(&directions, mean_laps))
@@ -172,17 +180,19 @@ impl Atlas {
             paths: Vec::new(),
             ripples: Ripples::default(),
             kept: Kept::default(),
+            made: 0,
             spent: Spent::default(),
         };
         drop(null);
-        atlas.paths = atlas.simulate_paths(&ticking);
+        atlas.paths = atlas.simulate_paths(&ticking, tick);
         atlas.ripples = atlas.ripples(&ticking, &Hypothesis::nothing(), round);
+        atlas.made = simulated.into_inner() * atlas.layout.total_laps() as u64;
         atlas.spent = Spent::default();
         Ok(atlas)
     }
 
-    /// The action of every probe at every size.
-    fn simulate_paths(&self, simulate: &Simulate<'_>) -> Vec<Vec<Option<White>>> {
+    /// The action of every probe at every size; `tick` is called for each data set that need not be simulated.
+    fn simulate_paths(&self, simulate: &Simulate<'_>, tick: &(dyn Fn() + Sync)) -> Vec<Vec<Option<White>>> {
         let jobs: Vec<(usize, usize)> = (self.probes.iter().enumerate())
             .flat_map(|(p, probe)| (0..probe.sizes.len()).map(move |k| (p, k)))
             .collect();
@@ -191,7 +201,9 @@ impl Atlas {
             .map(|&(p, k)| {
                 let probe = &self.probes[p];
                 let setting = [probe.setting(probe.sizes[k])];
-                let found = self.simulated(simulate, &setting, PATH_SETS, &self.spent)?;
+                let found =
+                    self.simulated_until(simulate, &setting, 0..PATH_SETS, PATH_ERROR, &self.spent)?;
+                (found.summaries.len() as u64..PATH_SETS).for_each(|_| tick());
                 Some(self.white(&found.expectation, &self.null))
             })
             .collect();
@@ -222,6 +234,7 @@ impl Atlas {
             ripples: Ripples::join(&parts.iter().map(|part| &part.ripples).collect::<Vec<_>>()),
             probes,
             kept: Kept::default(),
+            made: parts.iter().map(|part| part.made).sum(),
             spent: Spent::default(),
         })
     }
@@ -242,6 +255,7 @@ impl Atlas {
             layout: self.layout.clone(),
             paths: self.paths.clone(),
             ripples: self.ripples.clone(),
+            made: self.made,
             kept: self.kept.to_map(),
         })
         .expect("numbers and lists have a form as bytes")
@@ -258,6 +272,7 @@ impl Atlas {
             layout,
             paths,
             ripples,
+            made,
             kept,
         } = postcard::from_bytes(bytes).ok()?;
         let probes = if made_with.is_empty() {
@@ -275,11 +290,12 @@ impl Atlas {
             paths,
             ripples,
             kept: Kept::of(kept),
+            made,
             spent: Spent::default(),
         })
     }
 
-    /// Number of data sets that [`Atlas::new`] simulates with so many other cuts.
+    /// Number of data sets that [`Atlas::new`] simulates at most with so many other cuts.
     pub fn sets(cuts: usize) -> u64 {
         let sets = |probe: &Probe| PATH_SETS * probe.sizes.len() as u64;
         // As many whatever the step.
@@ -292,9 +308,9 @@ impl Atlas {
         NULL_SETS + CUT_SETS * cuts as u64
     }
 
-    /// Number of laps that diagnoses asked for, those of the atlas itself not counted.
+    /// Number of laps that diagnoses asked for and that the atlas was made of, whenever that was.
     pub fn spent(&self) -> u64 {
-        self.spent.count()
+        self.made + self.spent.count()
     }
 
     /// The mean of some of the data sets simulated of the declared model.
@@ -399,6 +415,7 @@ struct Stored {
     layout: Layout,
     paths: Vec<Vec<Option<White>>>,
     ripples: Ripples,
+    made: u64,
     kept: BTreeMap<String, Action>,
 }
 

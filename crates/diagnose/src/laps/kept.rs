@@ -126,19 +126,21 @@ mod tests {
     use sim::Pattern;
 
     use super::*;
-    use crate::laps::atlas::{Atlas, Extent};
+    use crate::laps::atlas::{Atlas, Extent, NULL_SETS};
     use crate::{ObservedLap, ObservedRun};
 
     const GATES: usize = 40;
 
-    /// Two runs of laps that scatter by 1 mm, where a wheel scale puts them aside by as many mm and a thousand stops the robot.
+    /// Two runs of laps that scatter by 1 mm, where a wheel scale puts them aside by as many mm, from a hundred on by other draws, and a
+    /// thousand stops the robot.
     fn simulated(effects: &[Setting], set: u64, extent: Extent) -> Option<Vec<ObservedRun>> {
         let aside_mm = effects.first().map_or(0.0, |effect| match &effect.pattern {
             Pattern::Constant(values) => values[0],
             _ => unreachable!(),
         });
         let run = |run: u64| {
-            let mut stream = sim::Streams { seed: set, run }.open("laps");
+            let purpose = if aside_mm < 100.0 { "laps" } else { "other laps" };
+            let mut stream = sim::Streams { seed: set, run }.open(purpose);
             let mut lap = |number: usize| {
                 let mut time_s = 60.0 * number as f64;
                 let times_s: Vec<f64> = (0..=GATES)
@@ -221,13 +223,29 @@ mod tests {
             spent: &made.spent,
         };
         let aside = [Setting::constant(sim::find("wheel-scale").unwrap(), [2.0])];
+        let before = made.spent();
         let found = trial.simulated_by(&aside, &Draws::FirstRuns(7)).unwrap();
-        assert_eq!(made.spent(), 5);
+        assert_eq!(made.spent() - before, 5);
         let whole = simulated(&aside, 7, Extent::Whole).unwrap();
         let first = made.observed(&whole).unwrap().0.remove(0).means.remove(0);
         assert_eq!(found.0[0].means.len(), 2);
         for mean in &found.0[0].means {
             assert!((mean - &first).amax() < 1e-9);
         }
+    }
+
+    #[test]
+    fn as_few_data_sets_are_simulated_as_tell_enough() {
+        let made = Atlas::without_effects(&simulated, &[], true, &|| ()).unwrap();
+        assert_eq!(made.spent(), NULL_SETS * 10);
+        let sets = |aside_mm: f64, error: f64| {
+            let aside = [Setting::constant(sim::find("wheel-scale").unwrap(), [aside_mm])];
+            let found = made.simulated_until(&simulated, &aside, 0..3, error, &made.spent);
+            found.unwrap().summaries.len()
+        };
+        // Draws that do the same to the declared model tell all; others nothing, of which each of n data sets leaves 1 / n.
+        assert_eq!((sets(2.0, 0.12), sets(200.0, 0.12)), (1, 3));
+        assert_eq!((sets(200.0, 0.5), sets(200.0, 1.0)), (2, 1));
+        assert_eq!(made.spent(), (NULL_SETS + 1 + 3 + 2 + 1) * 10);
     }
 }

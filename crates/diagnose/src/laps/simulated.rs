@@ -95,24 +95,11 @@ impl Trial<'_> {
     /// The mean of data sets as [`Trial::simulated_plainly`] tells it, by as few of them as make it as good with the control variate
     /// of [`Trial::evaluate`].
     pub(super) fn simulated_briefly(&self, settings: &[Setting], sets: Range<u64>) -> Option<Expectation> {
-        let alike = self.atlas.are_alike(settings);
-        // How runs differ that should be alike tells what draws do, or else how data sets do.
-        let runs_tell = alike && self.atlas.layout.laps.iter().any(|laps| laps.len() > 1);
-        let fewest = if runs_tell { 1 } else { 2 };
-        let all = sets.end - sets.start;
-        if all < fewest {
-            return self.simulated_plainly(settings, sets);
-        }
-        let summaries = self.summaries(settings, sets.start..sets.start + fewest)?;
-        let first = self.atlas.paired(summaries, sets.start, alike);
-        let of_one = first.doubt.error * fewest as f64;
-        let enough = ((of_one * all as f64).round() as u64).clamp(fewest, all);
-        if enough == fewest {
-            return Some(first.expectation);
-        }
-        let mut summaries = first.summaries;
-        summaries.extend(self.summaries(settings, sets.start + fewest..sets.start + enough)?);
-        Some(self.atlas.paired(summaries, sets.start, alike).expectation)
+        let error = 1.0 / (sets.end - sets.start) as f64;
+        let found = self
+            .atlas
+            .simulated_until(self.simulate, settings, sets, error, self.spent)?;
+        Some(found.expectation)
     }
 
     /// What effects leave of the data, in units of their own scatter; `None` where the robot crashes. That a lap is lost now and
@@ -187,6 +174,37 @@ impl Atlas {
     ) -> Option<Evaluated> {
         let summaries = self.summaries(simulate, settings, 0..sets, spent)?;
         Some(self.paired(summaries, 0, self.are_alike(settings)))
+    }
+
+    /// Settings simulated with as few of some data sets as tell them within an error, in a data set's variance, or else with all.
+    pub(super) fn simulated_until(
+        &self,
+        simulate: &Simulate<'_>,
+        settings: &[Setting],
+        sets: Range<u64>,
+        error: f64,
+        spent: &Spent,
+    ) -> Option<Evaluated> {
+        let alike = self.are_alike(settings);
+        // How runs differ that should be alike tells what draws do, or else how data sets do.
+        let runs_tell = alike && self.layout.laps.iter().any(|laps| laps.len() > 1);
+        let fewest = if runs_tell { 1 } else { 2 };
+        let all = sets.end - sets.start;
+        let few = sets.start..sets.start + fewest.min(all);
+        let first = self.paired(self.summaries(simulate, settings, few, spent)?, sets.start, alike);
+        let of_one = first.doubt.error * fewest as f64;
+        let enough = ((of_one / error).round() as u64).clamp(fewest, all.max(fewest));
+        if enough == fewest {
+            return Some(first);
+        }
+        let mut summaries = first.summaries;
+        summaries.extend(self.summaries(
+            simulate,
+            settings,
+            sets.start + fewest..sets.start + enough,
+            spent,
+        )?);
+        Some(self.paired(summaries, sets.start, alike))
     }
 
     fn summaries(
