@@ -383,6 +383,18 @@ impl Search<'_> {
         }
     }
 
+    /// What goes with an effect that jumps, if that is the best of the single ones and the best explanation is of several others, tried to
+    /// the end.
+    pub(super) fn about_a_single_that_jumps(&self, found: &[Found]) -> Vec<Found> {
+        let is_single = |one: &&Found| one.hypothesis.parts.len() == 1;
+        let of_others = found
+            .first()
+            .is_some_and(|best| !is_single(&best) && !self.jumps(&best.hypothesis));
+        let single = found.iter().find(is_single).filter(|_| of_others);
+        let starts = single.map_or(Vec::new(), |single| self.pairs_about(single));
+        self.try_rounds(starts.iter(), &ROUNDS_OF_SEVERAL)
+    }
+
     /// Such pairs, those that come nearest first, as far as the other's size follows.
     pub(super) fn hunts_of_pairs(&self, screened: &[Beside]) -> Vec<Hunt> {
         self.tell(format_args!("which sizes that jump go with another effect"));
