@@ -86,6 +86,7 @@ impl Atlas {
         // Candidates share their draws, so that much of the error is common to them: it counts where it is large.
         let behind = ALTERNATIVE.max(2.0 * found.first().map_or(0.0, |best| best.gain_error));
         let indistinguishable = indistinguishable(found.iter().map(|found| &found.explanation), behind);
+        explained_first(&mut found[..indistinguishable]);
         let verdict = found.first().map(|best| verdict_of(&best.explanation));
         let verdict = verdict.unwrap_or(Verdict::Unexplained);
         if verdict == Verdict::Explained {
@@ -310,6 +311,16 @@ fn worth_a_pattern(found: &[Found]) -> impl Iterator<Item = &Found> {
         f64::NEG_INFINITY
     };
     found.iter().take(MOST).filter(move |found| score(found) > least)
+}
+
+/// Of explanations that the data hardly tell apart one that explains them comes first, where the best leaves something significant.
+fn explained_first(alike: &mut [Found]) {
+    let is = |verdict: Verdict| move |found: &Found| verdict_of(&found.explanation) == verdict;
+    if alike.first().is_some_and(is(Verdict::PartlyExplained))
+        && let Some(place) = alike.iter().position(is(Verdict::Explained))
+    {
+        alike[..=place].rotate_right(1);
+    }
 }
 
 fn first_is(found: &[Found], holds: impl Fn(&Explanation) -> bool) -> bool {
