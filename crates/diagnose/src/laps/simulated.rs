@@ -188,23 +188,22 @@ impl Atlas {
         let alike = self.are_alike(settings);
         // How runs differ that should be alike tells what draws do, or else how data sets do.
         let runs_tell = alike && self.layout.laps.iter().any(|laps| laps.len() > 1);
-        let fewest = if runs_tell { 1 } else { 2 };
         let all = sets.end - sets.start;
-        let few = sets.start..sets.start + fewest.min(all);
-        let first = self.paired(self.summaries(simulate, settings, few, spent)?, sets.start, alike);
+        let fewest = if runs_tell { 1 } else { 2 }.min(all);
+        let (start, few) = (sets.start, sets.start + fewest);
+        let first = self.paired(
+            self.summaries(simulate, settings, start..few, spent)?,
+            start,
+            alike,
+        );
         let of_one = first.doubt.error * fewest as f64;
-        let enough = ((of_one / error).round() as u64).clamp(fewest, all.max(fewest));
+        let enough = ((of_one / error).round() as u64).clamp(fewest, all);
         if enough == fewest {
             return Some(first);
         }
         let mut summaries = first.summaries;
-        summaries.extend(self.summaries(
-            simulate,
-            settings,
-            sets.start + fewest..sets.start + enough,
-            spent,
-        )?);
-        Some(self.paired(summaries, sets.start, alike))
+        summaries.extend(self.summaries(simulate, settings, few..start + enough, spent)?);
+        Some(self.paired(summaries, start, alike))
     }
 
     fn summaries(
