@@ -113,12 +113,16 @@ static WARMING: Spec = Spec {
     name: "warming",
     stage: Stage::Sense,
     summary: "readings settle after the start",
-    params: &[Param::new("share", "", 0.0, -0.9, 0.9)],
+    params: &[
+        Param::new("share", "", 0.0, -0.9, 0.9),
+        // In which they come to 1 - 1/e of their final heat.
+        Param::place("time_s", "s", 1.0, 1e5),
+    ],
     list: None,
     build: || Box::new(Warming),
 };
 
-/// Time in which they come to 1 - 1/e of their final heat.
+/// Some minutes.
 const WARMING_S: f64 = 150.0;
 
 #[derive(Debug)]
@@ -126,7 +130,7 @@ struct Warming;
 
 impl Effect for Warming {
     fn readings(&mut self, values: &[f64], now: &Moment, _machine: &Machine, readings: &mut Readings) {
-        let warm = 1.0 - (-now.time_s / WARMING_S).exp();
+        let warm = 1.0 - (-now.time_s / values[1]).exp();
         readings.iter_mut().for_each(|r| *r *= 1.0 + values[0] * warm);
     }
 }
@@ -292,7 +296,7 @@ fn sensors_that_warm_up_have_no_name_and_settle() {
     const SHARE: f64 = 0.4;
     share_signatures("braitenberg");
     let scratch = Scratch::new();
-    Robot::with(Setting::constant(&WARMING, [SHARE])).record(&scratch, "set");
+    Robot::with(Setting::constant(&WARMING, [SHARE, WARMING_S])).record(&scratch, "set");
     let found = trace(&scratch, "braitenberg", "set", &[]);
     says(&found, "explained", &["unlisted"]);
     let coefficients = without_name(&found, SETTLING);
@@ -307,6 +311,22 @@ fn sensors_that_warm_up_have_no_name_and_settle() {
     }
     let model = std::fs::read_to_string(scratch.path("out/model.after.toml")).unwrap();
     assert!(model.contains(&format!("{end}")), "{model}");
+}
+
+/// Of what they do is next to nothing left in the laps that count.
+#[test]
+fn sensors_that_warm_up_while_no_lap_counts_settle_too() {
+    let scratch = Scratch::new();
+    share_signatures("rule-based");
+    let robot = Robot {
+        controller: ground::rule_based(),
+        ..Robot::with(Setting::constant(&WARMING, [0.15, 52.0]))
+    };
+    robot.record(&scratch, "set");
+    let found = trace(&scratch, "rule-based", "set", &[]);
+    says(&found, "explained", &["unlisted"]);
+    let end = without_name(&found, SETTLING)[0];
+    assert!((end - 0.15).abs() < 0.01, "{found:#}");
 }
 
 #[test]
@@ -500,7 +520,7 @@ fn a_wheel_out_of_round_is_known_by_how_laps_ripple() {
 fn sensors_that_warm_up_settle_in_logs() {
     const SHARE: f64 = 0.2;
     let scratch = Scratch::new();
-    let robot = Robot::with(Setting::constant(&WARMING, [SHARE]));
+    let robot = Robot::with(Setting::constant(&WARMING, [SHARE, WARMING_S]));
     robot.logged(&[4; 3]).record(&scratch, "set");
     let found = trace(&scratch, "braitenberg", "set", &[]);
     says(&found, "explained", &["unlisted"]);

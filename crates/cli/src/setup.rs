@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use anyhow::{Context, Result, anyhow};
-use diagnose::{Beginning, ObservedLap, ObservedRun, Unseen};
+use diagnose::{ObservedRun, Unseen};
 use sim::{
     Beam, CasterKind, Circuit, Drive, Machine, Model, Mount, Pattern, ReadingNoise, Response, Robot,
     RunRules, Scene, Setting, Step, Streams, Vec2, WallRules,
@@ -79,10 +79,7 @@ impl Setup {
             &self.scene.circuit().gates,
             self.model.machine.controller.speed_m_s(),
         );
-        ObservedRun {
-            laps: ObservedLap::on_path(seen, path, gates, self.model.run.way, speed_m_s),
-            beginning: Beginning::of(path),
-        }
+        ObservedRun::on_path(seen, path, gates, self.model.run.way, speed_m_s)
     }
 }
 

@@ -97,6 +97,7 @@ pub struct LapTracker {
     due: i64,
     passed: u64,
     lap: Option<Lap>,
+    run_up: Lap,
     gates: Arc<[Gate]>,
     way: Way,
 }
@@ -142,6 +143,7 @@ impl LapTracker {
             due: 0,
             passed: 0,
             lap: None,
+            run_up: Lap::new(gates.len()),
             gates: gates.shared(),
             way,
         }
@@ -169,6 +171,12 @@ impl LapTracker {
     /// How many gates the robot has passed for the first time, in order, missed ones included; never falls.
     pub fn gates_passed(&self) -> u64 {
         self.passed
+    }
+
+    /// What was crossed before the first lap began: the gates from where the robot was first seen, its end once gate 0 was crossed, and
+    /// NaN at all others; none of them count as missed.
+    pub fn run_up(&self) -> &Lap {
+        &self.run_up
     }
 
     /// Everything but staying between the same two gates.
@@ -255,10 +263,9 @@ impl LapTracker {
         if gate == 0 {
             closed = self.next_lap(time_s).or(closed);
         }
-        if let Some(lap) = &mut self.lap {
-            lap.offsets_m[gate] = offset_m;
-            lap.times_s[gate] = time_s;
-        }
+        let lap = self.lap.as_mut().unwrap_or(&mut self.run_up);
+        lap.offsets_m[gate] = offset_m;
+        lap.times_s[gate] = time_s;
         self.passed += 1;
         self.due = index + 1;
         closed
@@ -283,8 +290,14 @@ impl LapTracker {
             start_s: time_s,
             ..Lap::new(self.gates.len())
         };
-        let closed = self.lap.replace(next);
-        closed.map(|lap| Lap { end_s: time_s, ..lap })
+        let Some(closed) = self.lap.replace(next) else {
+            self.run_up.end_s = time_s;
+            return None;
+        };
+        Some(Lap {
+            end_s: time_s,
+            ..closed
+        })
     }
 
     fn count(&self) -> i64 {
@@ -395,6 +408,31 @@ mod tests {
                 prop_assert!((lap.times_s[next] - lap.start_s - 1.0).abs() < 1e-9);
                 prop_assert_eq!(lap.times_s[0], lap.start_s);
             }
+        }
+
+        #[test]
+        fn what_comes_before_gate_0_is_the_run_up(start in 2..N - 1, backward: bool) {
+            let gates = gates();
+            let way = if backward { Way::Backward } else { Way::Forward };
+            let number = |step: usize| if backward { (start + 2 * N - step) % N } else { (start + step) % N };
+            let mut tracker = LapTracker::new(&gates, way);
+            for (time_s, position) in path(&gates, way, (0..N).map(|step| (number(step), 0.01))) {
+                tracker.push(time_s, position);
+            }
+            let run_up = tracker.run_up();
+            let until = if backward { start } else { N - start };
+            prop_assert!((run_up.end_s - until as f64).abs() < 1e-9 && run_up.start_s.is_nan());
+            // The tracker first sees the robot where it is just before the gate that it starts at.
+            for step in 0..N {
+                let gate = number(step);
+                if step < until {
+                    prop_assert!((run_up.times_s[gate] - step as f64).abs() < 1e-9);
+                    prop_assert!((run_up.offsets_m[gate] - 0.01).abs() < 1e-9);
+                } else {
+                    prop_assert!(run_up.times_s[gate].is_nan() && run_up.offsets_m[gate].is_nan());
+                }
+            }
+            prop_assert!(run_up.missed.is_empty());
         }
 
         #[test]

@@ -79,8 +79,12 @@ impl RunPlace<'_> {
     /// A run in this place with laps that were seen on a path, as a diagnosis takes it.
     fn observed(&self, setup: &Setup, laps: Vec<Lap>, path: &[(f64, Vec2)]) -> ObservedRun {
         let observed = setup.observed(laps, path);
+        if self.begins {
+            return observed;
+        }
         ObservedRun {
-            beginning: observed.beginning.filter(|_| self.begins),
+            beginning: None,
+            before: Vec::new(),
             ..observed
         }
     }
@@ -248,10 +252,15 @@ impl Recording {
     /// robot does changes in the course of a run.
     pub(super) fn places(&self, effects: &[Setting]) -> Vec<RunPlace<'_>> {
         let changes = (self.setup.model.effects.iter().chain(effects)).any(Setting::depends_on_time);
+        self.places_from(changes)
+    }
+
+    /// The measured runs as places of simulated ones, which start where those did or anywhere.
+    fn places_from(&self, their_starts: bool) -> Vec<RunPlace<'_>> {
         (self.measured.runs.iter().zip(&self.unseen).enumerate())
             .map(|(i, (run, unseen))| RunPlace {
                 number: self.first_run + i,
-                start: changes.then(|| run.start()),
+                start: their_starts.then(|| run.start()),
                 unseen: Some(unseen).filter(|unseen| !unseen.is_nothing()),
                 begins: self.beginnings.is_known(i),
             })
@@ -265,7 +274,11 @@ impl Recording {
         seeds: Seeds,
         extent: Extent,
     ) -> Option<Vec<ObservedRun>> {
-        self.simulate_at(self.places(effects), &self.setup, effects, seeds, extent)
+        let places = match extent {
+            Extent::FromTheirStarts => self.places_from(true),
+            Extent::Whole | Extent::FirstRuns => self.places(effects),
+        };
+        self.simulate_at(places, &self.setup, effects, seeds, extent)
     }
 
     /// The same of another setup, whatever was measured unless the declared model itself changes in the course of a run.

@@ -30,6 +30,8 @@ pub type Simulate<'a> = dyn Fn(&[Setting], u64, Extent) -> Option<Vec<ObservedRu
 pub enum Extent {
     /// Every run.
     Whole,
+    /// Every run from where the measured one began.
+    FromTheirStarts,
     /// The first run of every recording.
     FirstRuns,
 }
@@ -38,7 +40,7 @@ impl Extent {
     /// How many of so many runs of a recording it is.
     pub fn runs(self, of: usize) -> usize {
         match self {
-            Self::Whole => of,
+            Self::Whole | Self::FromTheirStarts => of,
             Self::FirstRuns => of.min(1),
         }
     }

@@ -164,6 +164,7 @@ mod tests {
             ObservedRun {
                 laps: (0..5).map(&mut lap).collect(),
                 beginning: None,
+                before: Vec::new(),
             }
         };
         let runs = extent.runs(2) as u64;

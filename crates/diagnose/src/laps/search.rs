@@ -20,6 +20,7 @@ use super::rounds::{
     ERRORS, ROUNDS, ROUNDS_BESIDE, ROUNDS_FROM_NEAR, ROUNDS_OF_GROUPS, ROUNDS_OF_SEVERAL, Rung, best_of, near,
 };
 use super::scans::Scan;
+use super::steadiness::Settling;
 use super::tests_of_fit::{Departures, Quadratic, SIGNIFICANT_P};
 use super::trial::Trial;
 use super::verdict::is_noise;
@@ -281,14 +282,11 @@ impl Search<'_> {
     /// on, tried to the end.
     pub(super) fn settling(&self, best: &Found) -> Vec<Found> {
         self.tell(format_args!("whether {} holds still", best.explanation.label()));
-        let of_part = |part: usize| {
-            let settling = self.trial.settling(self.runs, &best.hypothesis, part)?;
-            Some((part, settling))
-        };
+        let sigmas = |settling: &[Settling]| settling.first().map_or(0.0, |settling| settling.sigmas.abs());
         let Some((part, settling)) = (0..best.hypothesis.parts.len())
-            .filter_map(of_part)
-            .filter(|(_, settling)| settling.p() < SIGNIFICANT_P)
-            .max_by(|a, b| a.1.sigmas.abs().total_cmp(&b.1.sigmas.abs()))
+            .filter_map(|part| Some((part, self.trial.settling(self.runs, &best.hypothesis, part)?)))
+            .filter(|(_, settling)| !settling.is_empty())
+            .max_by(|a, b| sigmas(&a.1).total_cmp(&sigmas(&b.1)))
         else {
             return Vec::new();
         };
@@ -296,10 +294,9 @@ impl Search<'_> {
         let Some(left) = self.left_by(&others) else {
             return Vec::new();
         };
-        let starts: Vec<Hypothesis> = (self.trial)
-            .screen_settling(&left, &settling)
-            .iter()
-            .map(|start| others.with(start))
+        let starts: Vec<Hypothesis> = (settling.iter())
+            .flat_map(|settling| self.trial.screen_settling(&left, settling))
+            .map(|start| others.with(&start))
             .collect();
         self.try_rounds(starts.iter(), &ROUNDS_OF_GROUPS)
     }

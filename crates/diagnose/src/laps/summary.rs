@@ -5,6 +5,8 @@ use std::ops::Range;
 use nalgebra::{DMatrix, DVector};
 use statrs::statistics::{Data, OrderStatistics};
 
+use track::Lap;
+
 use super::beginning::{Beginning, MeanBeginning};
 use super::layout::ramp_norm;
 use super::observed::{ObservedLap, ObservedRun};
@@ -20,9 +22,18 @@ pub(super) const SECOND: usize = 21;
 /// The units make all entries of similar size. A block's duration runs from gate to gate, so that it is the same for
 /// laps driven either way round.
 pub(super) fn lap_vector(lap: &ObservedLap) -> DVector<f64> {
-    let lap = &lap.smooth;
+    vector_of(&lap.smooth)
+}
+
+/// As [`lap_vector`], of a lap by its moving mean; NaN where the lap is.
+pub(super) fn vector_of(lap: &Lap) -> DVector<f64> {
     let gates = lap.offsets_m.len();
-    let backward = gates > 1 && lap.times_s[1] > lap.times_s[gates - 1];
+    // Of two gates next to each other, but for gate 0, the later one is the first of a lap driven the other way round.
+    let pairs = lap.times_s.windows(2).skip(1);
+    let backward = pairs
+        .map(|pair| pair[0] - pair[1])
+        .find(|apart_s| !apart_s.is_nan());
+    let backward = backward.is_some_and(|apart_s| apart_s > 0.0);
     // The time at the border before gate g; border `gates` closes the lap.
     let time = |border: usize| match (border, backward) {
         (0, true) => lap.end_s,
@@ -96,7 +107,7 @@ impl Recording {
         if !(of_laps.chain(&beginning)).all(|numbers| numbers.iter().all(|x| x.is_finite())) {
             return None;
         }
-        let near = brought_near(vectors);
+        let near = Reach::of(&vectors).brought_all_near(vectors);
         let size = near[0][0].len();
         let mut scatter = DMatrix::zeros(size, size);
         let mut freedom = 0;
@@ -122,9 +133,27 @@ impl Recording {
     }
 }
 
-/// The laps of the runs of one recording as vectors, those that went far astray brought nearer.
-pub(super) fn lap_vectors(runs: &[ObservedRun]) -> Vec<Vec<DVector<f64>>> {
-    brought_near(of_each(runs, lap_vector))
+/// A run as vectors of laps, those that went far astray brought nearer.
+pub(super) struct RunVectors {
+    /// Of what comes before the laps that count, NaN where it is not known.
+    pub(super) before: Vec<DVector<f64>>,
+    pub(super) laps: Vec<DVector<f64>>,
+}
+
+impl RunVectors {
+    /// The runs of one recording.
+    pub(super) fn of(runs: &[ObservedRun]) -> Vec<Self> {
+        let laps = of_each(runs, lap_vector);
+        let reach = Reach::of(&laps);
+        let laps = reach.brought_all_near(laps);
+        let joined = |((run, laps), middle): ((&ObservedRun, _), &DVector<f64>)| Self {
+            before: (run.before.iter().map(vector_of))
+                .map(|lap| reach.brought_near(lap, middle))
+                .collect(),
+            laps,
+        };
+        runs.iter().zip(laps).zip(&reach.middles).map(joined).collect()
+    }
 }
 
 /// What a vector of each lap of each run is.
@@ -146,34 +175,60 @@ fn joined(a: &DVector<f64>, b: &DVector<f64>) -> DVector<f64> {
     DVector::from_iterator(a.len() + b.len(), a.iter().chain(b).copied())
 }
 
-/// Laps of which those that went far astray are brought nearer to the middle of their run, as a whole: one of them would decide
-/// a mean. How far is far is told by how all the others scatter.
-fn brought_near(mut runs: Vec<Vec<DVector<f64>>>) -> Vec<Vec<DVector<f64>>> {
-    /// Deviations, all along one of the stretches.
-    const FAR: f64 = 5.0;
-    let size = runs[0][0].len();
-    let middles: Vec<DVector<f64>> = runs.iter().map(|laps| middle(laps)).collect();
-    let squares: Vec<Vec<DVector<f64>>> = (runs.iter().zip(&middles))
-        .map(|(laps, middle)| {
-            let square = |lap: &DVector<f64>| (lap - middle).map(|x| x * x);
-            laps.iter().map(square).collect()
-        })
-        .collect();
-    let variances = DVector::from_fn(size, |i, _| {
-        trimmed_mean(squares.iter().flatten().map(|square| square[i]).collect())
-    });
-    for ((laps, squares), middle) in runs.iter_mut().zip(&squares).zip(&middles) {
-        for (lap, square) in laps.iter_mut().zip(squares) {
-            let deviations = square.component_div(&variances);
-            let most = stretches(size)
-                .map(|part| deviations.rows(part.start, part.len()).mean())
-                .fold(0.0, f64::max);
-            if most > FAR * FAR {
-                *lap = middle + (&*lap - middle) * (FAR / most.sqrt());
-            }
+/// How far laps lie from the middle of their run.
+///
+/// Laps that went far astray are brought nearer to it, as a whole: one of them would decide a mean. How far is far is told by how all
+/// the others scatter.
+struct Reach {
+    /// Of each run.
+    middles: Vec<DVector<f64>>,
+    /// Of the entries of a lap about its run's middle.
+    variances: DVector<f64>,
+}
+
+impl Reach {
+    /// Of the runs of one recording.
+    fn of(runs: &[Vec<DVector<f64>>]) -> Self {
+        let middles: Vec<DVector<f64>> = runs.iter().map(|laps| middle(laps)).collect();
+        let squares: Vec<DVector<f64>> = (runs.iter().zip(&middles))
+            .flat_map(|(laps, middle)| laps.iter().map(move |lap| (lap - middle).map(|x| x * x)))
+            .collect();
+        let variances = DVector::from_fn(middles[0].len(), |i, _| {
+            trimmed_mean(squares.iter().map(|square| square[i]).collect())
+        });
+        Self { middles, variances }
+    }
+
+    /// The same runs, as they are used.
+    fn brought_all_near(&self, runs: Vec<Vec<DVector<f64>>>) -> Vec<Vec<DVector<f64>>> {
+        let near = |(laps, middle): (Vec<DVector<f64>>, &DVector<f64>)| {
+            let laps = laps.into_iter();
+            laps.map(|lap| self.brought_near(lap, middle)).collect()
+        };
+        runs.into_iter().zip(&self.middles).map(near).collect()
+    }
+
+    /// A lap of which the middle is known, NaN where it is not known itself.
+    fn brought_near(&self, lap: DVector<f64>, middle: &DVector<f64>) -> DVector<f64> {
+        /// Deviations, all along one of the stretches.
+        const FAR: f64 = 5.0;
+        let deviations = (&lap - middle).map(|x| x * x).component_div(&self.variances);
+        let mean_of = |part: Range<usize>| {
+            let known = || {
+                deviations
+                    .rows_range(part.clone())
+                    .into_iter()
+                    .filter(|x| !x.is_nan())
+            };
+            known().sum::<f64>() / known().count() as f64
+        };
+        let most = stretches(lap.len()).map(mean_of).fold(0.0, f64::max);
+        if most > FAR * FAR {
+            middle + (lap - middle) * (FAR / most.sqrt())
+        } else {
+            lap
         }
     }
-    runs
 }
 
 /// Medians of the entries of some laps.
@@ -332,17 +387,28 @@ mod tests {
     #[test]
     fn a_lap_far_astray_hardly_moves_the_mean_and_no_other_lap_moves() {
         let usual = vec![usual_run(1), usual_run(2)];
-        assert_eq!(brought_near(usual.clone()), usual);
+        let brought_near = |runs: &Vec<Vec<DVector<f64>>>| Reach::of(runs).brought_all_near(runs.clone());
+        assert_eq!(brought_near(&usual), usual);
         let mut astray = usual.clone();
         // Eighty times as far as the others scatter (by 0.58) in ten gates.
         astray[1][7].rows_mut(40, 10).add_scalar_mut(46.0);
-        let near = brought_near(astray);
+        let near = brought_near(&astray);
         let most = near[1][7].rows(40, 10).map(|x| (x - 3.0).abs()).max();
         assert!((2.0..4.0).contains(&most), "{most}");
         for (run, laps) in near.iter().enumerate() {
             for (at, lap) in laps.iter().enumerate().filter(|(at, _)| (run, *at) != (1, 7)) {
                 assert_eq!(lap, &usual[run][at]);
             }
+        }
+        // Of a lap that is known in part that part is judged.
+        let reach = Reach::of(&usual);
+        let brought_near = |lap: &DVector<f64>| reach.brought_near(lap.clone(), &reach.middles[1]);
+        for (lap, is_near) in [(&usual[1][7], true), (&astray[1][7], false)] {
+            let mut part = lap.clone();
+            part.rows_mut(0, 43).fill(f64::NAN);
+            let near = brought_near(&part);
+            assert!(near.rows(0, 43).iter().all(|x| x.is_nan()));
+            assert_eq!(near.rows(43, 77) == part.rows(43, 77), is_near);
         }
     }
 
