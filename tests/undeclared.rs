@@ -316,17 +316,25 @@ fn sensors_that_warm_up_have_no_name_and_settle() {
 /// Of what they do is next to nothing left in the laps that count.
 #[test]
 fn sensors_that_warm_up_while_no_lap_counts_settle_too() {
+    const SHARE: f64 = 0.15;
+    const SOON_S: f64 = 52.0;
     let scratch = Scratch::new();
     share_signatures("rule-based");
     let robot = Robot {
         controller: ground::rule_based(),
-        ..Robot::with(Setting::constant(&WARMING, [0.15, 52.0]))
+        ..Robot::with(Setting::constant(&WARMING, [SHARE, SOON_S]))
     };
     robot.record(&scratch, "set");
     let found = trace(&scratch, "rule-based", "set", &[]);
     says(&found, "explained", &["unlisted"]);
-    let end = without_name(&found, SETTLING)[0];
-    assert!((end - 0.15).abs() < 0.01, "{found:#}");
+    let coefficients = without_name(&found, SETTLING);
+    let [end, more, time_s]: [f64; 3] = coefficients.try_into().unwrap();
+    assert!((end - SHARE).abs() < 0.01, "{found:#}");
+    let said = end + more * (-40.0 / time_s).exp();
+    let true_share = SHARE * (1.0 - (-40.0 / SOON_S).exp());
+    assert!((said - true_share).abs() < 0.04, "{said}, {found:#}");
+    let error = found["effects"][0]["standard_errors"][1].as_f64().unwrap();
+    assert!(0.05 * more.abs() < error && error < 0.3 * more.abs(), "{found:#}");
 }
 
 #[test]

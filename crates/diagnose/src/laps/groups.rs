@@ -9,7 +9,7 @@ use super::hypothesis::Hypothesis;
 use super::part::Part;
 use super::probe::Probe;
 use super::screen::price;
-use super::steadiness::Settling;
+use super::steadiness::{Asked, Settling};
 use super::trial::Trial;
 use crate::candidate::{WORDS, unlisted_values};
 
@@ -186,8 +186,15 @@ impl Trial<'_> {
             .filter_map(|(&(probe, _), action)| {
                 let (end, gain) = solve(&[action.as_ref()?], residual);
                 let multiples = [end[0], settling.more * end[0]];
-                let mut part = Part::group(&self.atlas.probes[probe], probe, &multiples);
+                let number = probe;
+                let probe = &self.atlas.probes[number];
+                let mut part = Part::group(probe, number, &multiples);
                 part.values[0].push(settling.time_s);
+                // Laps that count and do not show it would move it by chance.
+                let part = match settling.asked {
+                    Asked::Counted => part,
+                    Asked::All => part.with_tied(settling.at_first(probe.free[1].0), probe),
+                };
                 Some((gain, Hypothesis::of(part)))
             })
             .collect();
@@ -227,4 +234,26 @@ pub(super) fn solve(columns: &[&White], target: &White) -> (DVector<f64>, f64) {
         .map_or_else(|| DVector::zeros(count), |factor| factor.solve(&right));
     let gain = 0.5 * multiples.dot(&right);
     (multiples, gain)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::laps::part::Tied;
+
+    #[test]
+    fn what_is_tied_to_a_size_follows_it() {
+        let probe = groups().into_iter().find(Probe::settles).unwrap();
+        let [end, at_first] = [0, 1].map(|i| probe.free[i].0);
+        let tied = Tied {
+            parameter: at_first,
+            multiple: -0.5,
+            error: 0.1,
+        };
+        let mut part = Part::group(&probe, 0, &[1.0, 7.0]).with_tied(tied, &probe);
+        assert_eq!(part.values[0][at_first], -0.5 * part.values[0][end]);
+        part.values[0][end] = 3.0;
+        part.keep_tied(&probe);
+        assert_eq!((part.values[0][at_first], part.fitted_otherwise()), (-1.5, 1));
+    }
 }

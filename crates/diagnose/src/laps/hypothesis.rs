@@ -242,8 +242,8 @@ impl Hypothesis {
 
     /// How many numbers were fitted, one way or another.
     pub(super) fn fitted(&self, atlas: &Atlas) -> usize {
-        let held = self.parts.iter().filter(|part| part.held.is_some());
-        self.freedoms(atlas).len() + held.count()
+        let otherwise = self.parts.iter().map(Part::fitted_otherwise);
+        self.freedoms(atlas).len() + otherwise.sum::<usize>()
     }
 
     /// The shares that data leave, with these errors, of what robots of this kind do, one for each number: their product is the Occam
@@ -329,6 +329,9 @@ impl Hypothesis {
                     }
                 }
             }
+        }
+        for part in &mut moved.parts {
+            part.keep_tied(&atlas.probes[part.probe]);
         }
         moved
     }

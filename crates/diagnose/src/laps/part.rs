@@ -34,6 +34,17 @@ pub(super) struct Part {
     pub(super) stride: f64,
     /// The standard error of a size that was found by trying many: descents leave it alone.
     pub(super) held: Option<f64>,
+    /// What goes with its size wherever a descent leads that.
+    pub(super) tied: Option<Tied>,
+}
+
+/// A value that is a known multiple of its effect's size.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Tied {
+    pub(super) parameter: usize,
+    pub(super) multiple: f64,
+    /// Standard error of the multiple.
+    pub(super) error: f64,
 }
 
 /// A number of a hypothesis that a fit may change.
@@ -100,6 +111,7 @@ impl Part {
                 per_s: 0.0,
                 stride: 1.0,
                 held: None,
+                tied: None,
             },
             Shape::ByRun => Self {
                 probe,
@@ -108,6 +120,7 @@ impl Part {
                 per_s: 0.0,
                 stride: 1.0,
                 held: None,
+                tied: None,
             },
             Shape::ByTime => {
                 let per_s = sizes[1] / atlas.lap_s();
@@ -118,6 +131,7 @@ impl Part {
                     per_s,
                     stride: 1.0,
                     held: None,
+                    tied: None,
                 }
             }
         }
@@ -175,6 +189,23 @@ impl Part {
             per_s: 0.0,
             stride: (0.3 * largest).max(1.0),
             held: None,
+            tied: None,
+        }
+    }
+
+    /// The same with a value that goes with its size.
+    pub(super) fn with_tied(mut self, tied: Tied, probe: &Probe) -> Self {
+        self.tied = Some(tied);
+        self.keep_tied(probe);
+        self
+    }
+
+    /// Has what goes with its size follow it.
+    pub(super) fn keep_tied(&mut self, probe: &Probe) {
+        if let Some(tied) = self.tied {
+            for values in &mut self.values {
+                values[tied.parameter] = tied.multiple * values[probe.size_index()];
+            }
         }
     }
 
@@ -297,7 +328,12 @@ impl Part {
     /// How many numbers of it were fitted, one way or another: one that all runs share is one.
     pub(super) fn fitted(&self, part: usize, errors: &[(Freedom, f64)]) -> usize {
         let own = errors.iter().filter(|(freedom, _)| freedom.part == part);
-        own.count() + self.held.iter().len()
+        own.count() + self.fitted_otherwise()
+    }
+
+    /// How many numbers of it were found otherwise than by descents.
+    pub(super) fn fitted_otherwise(&self) -> usize {
+        self.held.iter().len() + self.tied.iter().len()
     }
 
     /// Standard errors in the order of the pattern's values: run after run, or start values and then slopes.
@@ -307,6 +343,12 @@ impl Part {
         let mut all = vec![0.0; count * self.values.len() + slopes];
         if let Some(error) = self.held {
             all[atlas.probes[self.probe].size_index()] = error;
+        }
+        if let Some(tied) = self.tied {
+            let size = atlas.probes[self.probe].size_index();
+            for (run, values) in self.values.iter().enumerate() {
+                all[run * count + tied.parameter] = tied.error * values[size].abs();
+            }
         }
         for (freedom, error) in errors.iter().filter(|(f, _)| f.part == part) {
             match freedom.parameter {
@@ -345,7 +387,11 @@ impl Part {
             return freedoms;
         }
         let size = self.mean_size(atlas);
+        let is_tied = |parameter: usize| self.tied.is_some_and(|tied| tied.parameter == parameter);
         for (i, &(parameter, _)) in probe.free.iter().enumerate() {
+            if is_tied(parameter) {
+                continue;
+            }
             let quantum = probe.quantum.filter(|_| i == 0);
             let step = quantum.unwrap_or(probe.step_at(i, size) * self.stride);
             let goes_by_run = self.shape == Shape::ByRun && probe.moves(parameter);

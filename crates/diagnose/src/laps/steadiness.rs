@@ -8,6 +8,7 @@ use super::atlas::{Atlas, Extent};
 use super::expectation::Scatter;
 use super::hypothesis::Hypothesis;
 use super::observed::ObservedRun;
+use super::part::Tied;
 use super::summary::RunVectors;
 use super::tests_of_fit::{Quadratic, SIGNIFICANT_P};
 use super::trial::Trial;
@@ -21,9 +22,20 @@ pub(super) struct Settling {
     pub(super) more: f64,
     /// That in standard deviations.
     pub(super) sigmas: f64,
+    /// What tells it.
+    pub(super) asked: Asked,
 }
 
 impl Settling {
+    /// What the value of a parameter is that says how much more the size is at first.
+    pub(super) fn at_first(&self, parameter: usize) -> Tied {
+        Tied {
+            parameter,
+            multiple: self.more,
+            error: (self.more / self.sigmas).abs(),
+        }
+    }
+
     /// Probability that chance makes as much of the likeliest of [`TIMES`] by [`LAPS_ASKED`] (Bonferroni).
     pub(super) fn p(&self) -> f64 {
         ((TIMES.len() * LAPS_ASKED.len()) as f64 * Quadratic::new(self.sigmas.powi(2), 1).p).min(1.0)
@@ -86,6 +98,7 @@ impl Trial<'_> {
                 time_s,
                 more: more / sum(|run| run.square),
                 sigmas: more / sum(|run| run.variance).sqrt(),
+                asked,
             }
         };
         let likeliest = |asked: Asked| {
@@ -99,7 +112,7 @@ impl Trial<'_> {
 
 /// Which laps of a run are asked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Asked {
+pub(super) enum Asked {
     /// All, and the way to the first of them.
     All,
     Counted,
