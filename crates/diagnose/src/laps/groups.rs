@@ -180,13 +180,12 @@ impl Trial<'_> {
     pub(super) fn screen_settling(&self, residual: &White, settling: &Settling) -> Vec<Hypothesis> {
         const MOST: usize = 2;
         let settling_groups = self.groups(Probe::settles).into_iter();
-        let jobs: Vec<(usize, usize)> = settling_groups.map(|probe| (probe, 0)).collect();
+        let jobs: Vec<(usize, usize)> = settling_groups.map(|number| (number, 0)).collect();
         let actions = self.actions(&jobs, GROUP_SETS);
         let mut found: Vec<(f64, Hypothesis)> = (jobs.iter().zip(&actions))
-            .filter_map(|(&(probe, _), action)| {
+            .filter_map(|(&(number, _), action)| {
                 let (end, gain) = solve(&[action.as_ref()?], residual);
                 let multiples = [end[0], settling.more * end[0]];
-                let number = probe;
                 let probe = &self.atlas.probes[number];
                 let mut part = Part::group(probe, number, &multiples);
                 part.values[0].push(settling.time_s);

@@ -39,7 +39,6 @@ impl ObservedRun {
             .into_iter()
             .filter_map(|(time_s, position)| tracker.push(time_s, position))
             .collect();
-        let apart_s = |a: f64, b: f64| (a - b).abs();
         let comes_before = |lap: &&Lap| {
             seen.first()
                 .is_some_and(|seen| lap.end_s < seen.start_s + spacing_s)
@@ -50,7 +49,7 @@ impl ObservedRun {
             .collect();
         let whole: Vec<&Lap> = smooth.iter().filter(|lap| lap.missed.is_empty()).collect();
         let observed = |seen: Lap| {
-            let off_s = |lap: &Lap| apart_s(lap.start_s, seen.start_s);
+            let off_s = |lap: &Lap| (lap.start_s - seen.start_s).abs();
             let same = whole.iter().min_by(|a, b| off_s(a).total_cmp(&off_s(b)));
             let same = same.filter(|lap| off_s(lap) < spacing_s);
             ObservedLap {
@@ -171,7 +170,7 @@ mod tests {
         };
         assert_eq!(known(&run.before[0]), (61..80).chain(82..100).collect::<Vec<_>>());
         assert_eq!(known(&run.before[1]), (0..100).collect::<Vec<_>>());
-        assert!(run.before[1].end_s - run.laps[0].smooth.start_s < 1e-9);
+        assert_eq!(run.before[1].end_s, run.laps[0].smooth.start_s);
         // One that begins just before gate 0 has not forgotten it in the first quarter of its first lap.
         let seen = laps(&gates, Way::Forward, &whole).split_off(1);
         let run = ObservedRun::on_path(seen, &whole, &gates, Way::Forward, speed_m_s);
