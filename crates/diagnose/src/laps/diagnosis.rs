@@ -219,9 +219,6 @@ fn explain(search: &Search<'_>, mut found: Vec<Found>) -> Vec<Found> {
     if !first_is(&found, suffices) {
         let beside = search.scans_beside(&found);
         found = preferred(found, beside);
-    } else {
-        let about = search.about_a_single_that_jumps(&found);
-        found = preferred(found, about);
     }
     if let Some(best) = found.first().filter(|best| best.explanation.effects.len() > 1)
         && !suffices(&best.explanation)

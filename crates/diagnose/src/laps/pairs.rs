@@ -55,8 +55,9 @@ impl Search<'_> {
 
     /// The best pairs, tried to the end until one leaves nothing significant: those that together explain most as far as actions add
     /// up, the best single effects with what explains their remainder best, and sizes that jump with another effect, which come
-    /// first where they promise more. Before these come last, sizes that jump are tried for themselves and added to the single
-    /// effects, if that was not done yet; first of all where they promise as much as the best of these explains.
+    /// first where they promise more, and where the best single effect is one. Before these come last, sizes that jump are tried for
+    /// themselves and added to the single effects, if that was not done yet; first of all where they promise as much as the best of
+    /// these explains.
     pub(super) fn pairs(&self, singles: &mut Vec<Found>) -> Vec<Found> {
         let fits = |singles: &[Found]| singles.first().is_some_and(|best| best.explanation.fits());
         let mut scanned = self.was_scanned();
@@ -77,6 +78,11 @@ impl Search<'_> {
         let jumps_first = hunts.first().is_some_and(|hunt| beats_others(hunt.left));
         if jumps_first {
             self.descend_on(&mut tried, self.pairs_that_jump(&hunts));
+        }
+        if let Some(single) = singles.first()
+            && !tried.fits()
+        {
+            self.descend_on(&mut tried, self.pairs_about(single));
         }
         if !tried.fits() {
             self.try_together(&mut tried);

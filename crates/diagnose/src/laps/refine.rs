@@ -129,6 +129,16 @@ impl Descent {
         }
     }
 
+    /// The same with other sizes of what was found by trying many, at which its other numbers do what they did.
+    pub(super) fn with_held(self, known: &[Part]) -> Self {
+        Self {
+            hypothesis: self.hypothesis.with_held(known),
+            found: false,
+            end: None,
+            ..self
+        }
+    }
+
     /// The score that another round like the last one would reach.
     pub(super) fn within_reach(&self) -> f64 {
         let progress = Some(self.progress).filter(|progress| progress.is_finite());

@@ -63,6 +63,11 @@ pub(super) const ROUNDS_FROM_NEAR: [Rung; 2] =
 /// Log-likelihood within which an effect that jumps is worth a closer look at its size.
 const NEAR: f64 = 50.0;
 
+/// Looks at sizes ever better beside others that follow, as many more where each still gains much, and log-likelihood by which one must
+/// change a descent for the next to matter.
+const LOOKS: usize = 3;
+const MATTERS: f64 = 5.0;
+
 /// Errors of a difference in log-likelihood that may be chance.
 pub(super) const ERRORS: f64 = 2.0;
 
@@ -157,7 +162,16 @@ impl Search<'_> {
 
     /// The ends of descents simulated often enough to judge them, best first.
     pub(super) fn settle(&self, descents: Vec<Descent>) -> Vec<Found> {
-        let settled = (self.hunted_again(descents).par_iter())
+        self.settle_hunted(self.hunted_again(descents, Moved::Far))
+    }
+
+    /// The same of descents from where sizes that jump had come to rest beside others that have moved little since.
+    pub(super) fn settle_near(&self, descents: Vec<Descent>) -> Vec<Found> {
+        self.settle_hunted(self.hunted_again(descents, Moved::Little))
+    }
+
+    fn settle_hunted(&self, descents: Vec<Descent>) -> Vec<Found> {
+        let settled = (descents.par_iter())
             .filter_map(|descent| self.trial.settle(descent))
             .collect();
         let mut found: Vec<Found> = (self.closer(settled).iter())
@@ -167,27 +181,26 @@ impl Search<'_> {
         self.without_repeats(found, |found| &found.hypothesis)
     }
 
-    /// Descents with better sizes of the effects that jump, which were found beside others that have moved since: those of
-    /// the best descent, for all that are near it, until they come to rest or no longer matter; and those of rivals, for themselves.
-    fn hunted_again(&self, mut descents: Vec<Descent>) -> Vec<Descent> {
-        /// Looks at sizes ever better, and as many more where each still gains much.
-        const LOOKS: usize = 3;
-        /// Share of the best score by which a descent may lie behind it and still be looked at, at first and later, and how many at most.
-        const SHARES: [f64; 2] = [0.03, 0.004];
-        const MOST: usize = 4;
-        /// Log-likelihood by which better sizes must change the best for still better ones to matter.
-        const MATTERS: f64 = 5.0;
+    /// Descents with better sizes of the effects that jump, which were found beside others that have moved since: those of the best
+    /// descent, for those that are near it, until they come to rest or no longer matter; and those of rivals, for
+    /// themselves.
+    fn hunted_again(&self, mut descents: Vec<Descent>, at_first: Moved) -> Vec<Descent> {
+        /// Share of the best score by which a descent may lie behind it and still follow at the first look, log-likelihood by which it
+        /// may later, and how many do.
+        const SHARE: f64 = 0.03;
+        const CLOSE: f64 = 15.0;
+        const MOST: [usize; 2] = [4, 2];
         let held = |part: &Part| part.held.is_some();
         for look in 0..2 * LOOKS {
-            let (moved, share) = if look == 0 {
-                (Moved::Far, SHARES[0])
-            } else {
-                (Moved::Little, SHARES[1])
-            };
             let Some(best) = best_of(&descents) else {
                 break;
             };
             let (best, before) = (&best.hypothesis, best.score);
+            let (moved, behind, most) = if look == 0 {
+                (at_first, NEAR.max(SHARE * before), MOST[0])
+            } else {
+                (Moved::Little, CLOSE, MOST[1])
+            };
             if best.parts.len() < 2 || !best.parts.iter().any(held) {
                 break;
             }
@@ -198,14 +211,17 @@ impl Search<'_> {
             let rest =
                 (hunted.parts.iter().zip(&best.parts)).all(|(now, before)| now.is_within_error_of(before));
             let known: Vec<Part> = hunted.parts.into_iter().filter(held).collect();
-            let least = before - NEAR.max(share * before);
+            let least = before - behind;
             descents.sort_by(|a, b| b.score.total_cmp(&a.score));
             descents = (descents.into_par_iter().enumerate())
                 .filter_map(|(place, descent)| {
-                    if descent.score < least || place >= MOST {
+                    if descent.score < least || place >= most {
                         return Some(descent);
                     }
-                    let start = Descent::start(self.atlas(), &descent.hypothesis.with_held(&known));
+                    let start = match moved {
+                        Moved::Far => Descent::start(self.atlas(), &descent.hypothesis.with_held(&known)),
+                        Moved::Little => descent.with_held(&known),
+                    };
                     self.trial.descend(start, Round::Full)
                 })
                 .collect();
@@ -236,13 +252,19 @@ impl Search<'_> {
         };
         let hunted = |rival: &Descent| {
             let hunted = self.trial.hunt_again(&rival.hypothesis, Moved::Little)?;
-            let start = Descent::start(self.atlas(), &hunted);
-            self.trial.descend(start, Round::Full)
+            (self.trial).descend(rival.clone().with_held(&hunted.parts), Round::Full)
         };
         let rivals = descents.iter_mut().skip(1).filter(|rival| is_rival(rival));
         for rival in rivals.take(MOST) {
-            if let Some(hunted) = hunted(rival).filter(|hunted| hunted.score > rival.score) {
+            for _ in 0..LOOKS {
+                let Some(hunted) = hunted(rival).filter(|hunted| hunted.score > rival.score) else {
+                    break;
+                };
+                let gained = hunted.score - rival.score;
                 *rival = hunted;
+                if gained <= MATTERS {
+                    break;
+                }
             }
         }
         descents

@@ -107,7 +107,7 @@ impl Trial<'_> {
             self.kept_looks(base, probe, &sizes, &closely())
         } else {
             let roughly = self.rough_draws(&base.hypothesis, excess / chance);
-            self.looks(base, probe, &sizes, &roughly.unwrap_or_else(closely))
+            self.looks_at_least(base, probe, &sizes, &roughly.unwrap_or_else(closely))
         };
         Some(Scan {
             probe,
@@ -139,15 +139,16 @@ impl Trial<'_> {
         sizes.into_par_iter().filter(may).collect()
     }
 
-    /// A probe that jumps with each of those that do not, at sizes close about the one to which it came alone: the best few. What the
-    /// other does is simulated beside it, because rounding makes another thing of it. Where the one leaves much, as a multiple of what chance
-    /// leaves, only what a rough look shows to be the best is looked at closely.
-    fn screen_about(&self, probe: usize, size: f64, left: f64, most: usize) -> Vec<Beside> {
+    /// A probe that jumps with each of others that do not, at sizes close about the one to which it came alone: the best few. What the
+    /// other does is simulated beside it, because rounding makes another thing of it. Only what a rough look shows to be the best is looked at
+    /// closely; the look is the rougher the more the one leaves, as a multiple of what chance leaves.
+    fn screen_about(&self, others: &[(usize, f64)], (probe, size): (usize, f64), left: f64) -> Vec<Beside> {
+        const ROUGHLY: [Draws; 2] = [Draws::Sets(0..1), Draws::Sets(2..3)];
         const CLOSER: [Draws; 2] = [Draws::Sets(0..2), Draws::Sets(2..4)];
         const SIZES: u32 = 81;
         /// Share of the size to either side.
         const REACH: f64 = 0.004;
-        const CLOSELY: usize = 24;
+        const CLOSELY: usize = 12;
         let (ratio, mut sizes) = in_constant_ratio(size * (1.0 - REACH), size * (1.0 + REACH), SIZES);
         let hunt = Hunt::new(
             self.atlas.at_rest(Hypothesis::nothing()),
@@ -155,15 +156,13 @@ impl Trial<'_> {
             size,
             size * (ratio - 1.0),
         );
-        let mut others = self.atlas.smallest_sizes();
-        if let Some(draws) = self.rough_draws(&hunt.base.hypothesis, left) {
-            let mut best = self.beside_hunted(&hunt, &sizes, &others, &draws);
-            best.truncate(CLOSELY);
-            sizes.retain(|&size| best.iter().any(|best| best.is_at_about(size)));
-            others = best.iter().map(|best| (best.other, best.other_size)).collect();
-        }
+        let roughly = self.rough_draws(&hunt.base.hypothesis, left).unwrap_or(ROUGHLY);
+        let mut best = self.beside_hunted(&hunt, &sizes, others, &roughly);
+        best.truncate(CLOSELY);
+        sizes.retain(|&size| best.iter().any(|best| best.is_at_about(size)));
+        let others: Vec<(usize, f64)> = best.iter().map(|best| (best.other, best.other_size)).collect();
         let closer = self.beside_hunted(&hunt, &sizes, &others, &CLOSER);
-        self.atlas.diverse_beside(closer, most)
+        self.atlas.diverse_beside(closer, HEARD)
     }
 
     /// Each of other probes, with a size at which it is simulated beside one that jumps where that is hunted: both at their best, the
@@ -374,25 +373,31 @@ impl Search<'_> {
             [part] if part.held.is_some() => {
                 self.tell(format_args!("sizes about that of {}", single.explanation.label()));
                 let left = self.excess(&single.residual) / self.chance();
-                let screened = self
-                    .trial
-                    .screen_about(part.probe, part.mean_size(self.atlas()), left, HEARD);
+                let likely = self.likely_beside(single);
+                let screened =
+                    (self.trial).screen_about(&likely, (part.probe, part.mean_size(self.atlas())), left);
                 self.pairs_that_jump(&self.hunts_of_pairs(&screened))
             }
             _ => Vec::new(),
         }
     }
 
-    /// What goes with an effect that jumps, if that is the best of the single ones and the best explanation is of several others, tried to
-    /// the end.
-    pub(super) fn about_a_single_that_jumps(&self, found: &[Found]) -> Vec<Found> {
-        let is_single = |one: &&Found| one.hypothesis.parts.len() == 1;
-        let of_others = found
-            .first()
-            .is_some_and(|best| !is_single(&best) && !self.jumps(&best.hypothesis));
-        let single = found.iter().find(is_single).filter(|_| of_others);
-        let starts = single.map_or(Vec::new(), |single| self.pairs_about(single));
-        self.try_rounds(starts.iter(), &ROUNDS_OF_SEVERAL)
+    /// The probes that explain best what a single effect leaves, by paths, each at its smallest sizes.
+    fn likely_beside(&self, single: &Found) -> Vec<(usize, f64)> {
+        /// Three times as far as right ones were down the list beside an effect that jumps: paths were simulated without it.
+        const LIKELY: usize = 60;
+        let base = self.trial.base(single.hypothesis.clone());
+        let screened = self.screened_beside(&base, &single.left);
+        let constant = screened.iter().filter(|other| other.hypothesis.is_constant());
+        let mut likely: Vec<usize> = Vec::new();
+        for probe in constant.map(|other| other.hypothesis.parts[0].probe) {
+            if likely.len() < LIKELY && !likely.contains(&probe) {
+                likely.push(probe);
+            }
+        }
+        let mut sizes = self.atlas().smallest_sizes();
+        sizes.retain(|(probe, _)| likely.contains(probe));
+        sizes
     }
 
     /// Such pairs, those that come nearest first, as far as the other's size follows.

@@ -174,7 +174,7 @@ impl Search<'_> {
         };
         let starts = (0..hypothesis.parts.len()).flat_map(exchanged).filter(is_new);
         let starts: Vec<Hypothesis> = starts.collect();
-        self.try_rounds(starts.iter(), &ROUNDS)
+        self.settle_near(self.descend(starts.iter(), &ROUNDS, f64::NEG_INFINITY))
     }
 
     /// Explanations near the best with the same effects at the other sensors, tried to the end: of one effect two were so far.
@@ -203,7 +203,7 @@ impl Search<'_> {
         let rounds: &[Rung] = if several { &ROUNDS_BESIDE } else { &ROUNDS };
         let mut descents = self.descend(starts.iter(), rounds, best);
         descents.retain(|descent| descent.score > best - BEHIND.max(ERRORS * descent.score_error));
-        self.settle(descents)
+        self.settle_near(descents)
     }
 
     /// Explanations with what explains best what they leave beside them, tried to the end.

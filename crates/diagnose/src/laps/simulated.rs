@@ -24,6 +24,16 @@ pub(super) enum Draws {
     FirstRuns(u64),
 }
 
+impl Draws {
+    /// The variance of what they tell, in that of a data set of so many runs.
+    pub(super) fn error(&self, runs: usize) -> f64 {
+        match self {
+            Self::Sets(sets) => 1.0 / (sets.end - sets.start) as f64,
+            Self::FirstRuns(_) => runs as f64,
+        }
+    }
+}
+
 /// A hypothesis simulated.
 #[derive(Debug, Clone)]
 pub(super) struct Evaluated {
