@@ -283,7 +283,7 @@ impl Part {
 
     /// Whether another is the same constant effect at a size less than a step away, and at the same place.
     pub(super) fn is_near(&self, other: &Self, atlas: &Atlas) -> bool {
-        self.agrees_with(other, atlas, |_| 1.0)
+        self.agrees_with(other, atlas, 1.0, |_| true)
     }
 
     /// Whether another is the same constant effect at about the same place, whatever its size and its length.
@@ -291,12 +291,11 @@ impl Part {
         const STEPS: f64 = 3.0;
         let probe = &atlas.probes[self.probe];
         let length = probe.spec.place_of("length_m");
-        let counts = |i: usize| !probe.is_size(i) && Some(i) != length;
-        self.agrees_with(other, atlas, |i| if counts(i) { STEPS } else { f64::INFINITY })
+        self.agrees_with(other, atlas, STEPS, |i| !probe.is_size(i) && Some(i) != length)
     }
 
-    /// Whether another is the same constant effect at values less than so many steps of each away.
-    fn agrees_with(&self, other: &Self, atlas: &Atlas, steps: impl Fn(usize) -> f64) -> bool {
+    /// Whether another is the same constant effect at values less than so many steps away, of the parameters that count.
+    fn agrees_with(&self, other: &Self, atlas: &Atlas, steps: f64, counts: impl Fn(usize) -> bool) -> bool {
         let probe = &atlas.probes[self.probe];
         let step = |i: usize| {
             probe
@@ -306,11 +305,11 @@ impl Part {
                 .map_or(0.0, |free| free.1)
         };
         let off = |i: usize| apart(self.values[0][i], other.values[0][i], probe.spec.params.get(i));
-        let near = |i: usize| steps(i) == f64::INFINITY || off(i).abs() <= steps(i) * step(i);
+        let near = |i: usize| off(i).abs() <= steps * step(i);
         probe.spec == atlas.probes[other.probe].spec
             && [self.shape, other.shape] == [Shape::Constant; 2]
             && self.values[0].len() == other.values[0].len()
-            && (0..self.values[0].len()).all(near)
+            && (0..self.values[0].len()).filter(|&i| counts(i)).all(near)
     }
 
     pub(super) fn setting(&self, probe: &Probe) -> Setting {

@@ -182,8 +182,7 @@ impl Search<'_> {
     }
 
     /// Descents with better sizes of the effects that jump, which were found beside others that have moved since: those of the best
-    /// descent, for those that are near it, until they come to rest or no longer matter; and those of rivals, for
-    /// themselves.
+    /// descent, for those that are near it, until they come to rest or no longer matter; and those of rivals, for themselves.
     fn hunted_again(&self, mut descents: Vec<Descent>, at_first: Moved) -> Vec<Descent> {
         /// Share of the best score by which a descent may lie behind it and still follow at the first look, log-likelihood by which it
         /// may later, and how many do.
