@@ -87,13 +87,13 @@ impl Atlas {
         let behind = ALTERNATIVE.max(2.0 * found.first().map_or(0.0, |best| best.gain_error));
         let indistinguishable = indistinguishable(found.iter().map(|found| &found.explanation), behind);
         explained_first(&mut found[..indistinguishable]);
-        let verdict = found.first().map(|best| verdict_of(&best.explanation));
-        let verdict = verdict.unwrap_or(Verdict::Unexplained);
-        if verdict == Verdict::Explained {
+        if verdict_of_first(&found) == Verdict::Explained {
             let equal = found[..indistinguishable].iter();
             let equal = equal.take_while(|found| suffices(&found.explanation)).count();
             self.most_probable_first(&mut found[..equal]);
         }
+        // The most probable answer may be one that is not to be claimed.
+        let verdict = verdict_of_first(&found);
         let (mut left_out, mut cause) = (vec![Vec::new(); runs.len()], None);
         if verdict != Verdict::Unexplained
             && let Some(answer) = found.first_mut()
@@ -318,6 +318,11 @@ fn explained_first(alike: &mut [Found]) {
     {
         alike[..=place].rotate_right(1);
     }
+}
+
+fn verdict_of_first(found: &[Found]) -> Verdict {
+    let first = found.first();
+    first.map_or(Verdict::Unexplained, |best| verdict_of(&best.explanation))
 }
 
 fn first_is(found: &[Found], holds: impl Fn(&Explanation) -> bool) -> bool {

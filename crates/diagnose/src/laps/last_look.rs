@@ -50,9 +50,7 @@ impl Trial<'_> {
             let freedoms: Vec<Freedom> = (widest.iter().zip(&look.errors))
                 .map(|(widest, (_, error))| widest.over(REACH * error, (LEAST, 1.0)))
                 .collect();
-            let points = 2 * freedoms.len() as u64 + 1;
-            let sets = self.atlas.enough(sets_at(points), points);
-            let Some(mut local) = self.local(&look.found, &freedoms, sets) else {
+            let Some(mut local) = self.local_until_clear(&look.found, &freedoms) else {
                 break;
             };
             local.columns = local.columns.into_iter().map(Column::without_noise).collect();
@@ -83,6 +81,22 @@ impl Trial<'_> {
             look.intervals = self.slow_intervals(&look.found, &look.errors, local);
         }
         look
+    }
+
+    /// The neighbourhood of a hypothesis, with more data sets where few leave it noisy.
+    fn local_until_clear(&self, hypothesis: &Hypothesis, freedoms: &[Freedom]) -> Option<Local> {
+        /// Data sets at all points together.
+        const FEW: u64 = 36;
+        const ALL: u64 = 100;
+        /// The least and the most at each of them.
+        const EACH: (u64, u64) = (6, 32);
+        let points = 2 * freedoms.len() as u64 + 1;
+        let local = |of_all: u64| {
+            let sets = (of_all / points).clamp(EACH.0, EACH.1);
+            self.local(hypothesis, freedoms, self.atlas.enough(sets, points))
+        };
+        let few = local(FEW)?;
+        if few.is_noisy() { local(ALL) } else { Some(few) }
     }
 
     /// For each run the effects with sizes fitted to the other runs alone, by the parabolas of the last look; a
@@ -150,10 +164,4 @@ impl Trial<'_> {
         let hunted = without.hunt_about(&found).unwrap_or(found);
         Ok(self.atlas.quantised(hunted))
     }
-}
-
-/// Data sets at each of so many points.
-fn sets_at(points: u64) -> u64 {
-    const OF_ALL: u64 = 100;
-    (OF_ALL / points).clamp(6, 32)
 }

@@ -8,7 +8,7 @@ use super::part::Part;
 use super::refine::{CLOSE_SETS, Descent, Round, Settled};
 use super::search::{Found, Search, sort};
 use super::simulated::FINAL_SETS;
-use super::tests_of_fit::{Departures, HOPELESS_P};
+use super::verdict::is_no_answer;
 
 /// A rung of successive halving (Jamieson and Talwalkar 2016): a round of every descent, after which does not come back what lies
 /// behind the best by more than a log-likelihood and a share of the best one's.
@@ -16,20 +16,33 @@ use super::tests_of_fit::{Departures, HOPELESS_P};
 pub(super) struct Rung {
     round: Round,
     behind: f64,
+    /// The log-likelihood behind a best one of one number: parabolas in several promise more than they keep.
+    behind_one: f64,
     share: f64,
 }
 
 const fn rung(round: Round, behind: f64, share: f64) -> Rung {
-    Rung { round, behind, share }
+    Rung {
+        round,
+        behind,
+        behind_one: behind,
+        share,
+    }
+}
+
+impl Rung {
+    const fn of_one(self, behind_one: f64) -> Self {
+        Self { behind_one, ..self }
+    }
 }
 
 /// Those of single effects.
 pub(super) const ROUNDS: [Rung; 5] = [
-    rung(Round::Rough, 50.0, 0.2),
-    rung(Round::Again, 30.0, 0.03),
-    rung(Round::Full, 20.0, 0.004),
-    rung(Round::Full, 15.0, 0.004),
-    rung(Round::Full, 15.0, 0.004),
+    rung(Round::Rough, 50.0, 0.2).of_one(25.0),
+    rung(Round::Again, 30.0, 0.03).of_one(8.0),
+    rung(Round::Full, 20.0, 0.004).of_one(8.0),
+    rung(Round::Full, 15.0, 0.004).of_one(8.0),
+    rung(Round::Full, 15.0, 0.004).of_one(8.0),
 ];
 
 /// The same for several effects together, of which more are tried.
@@ -91,10 +104,18 @@ impl Search<'_> {
     ) -> Vec<Descent> {
         /// Descents that go on where none seems to come to an end, or the others seem to lose.
         const FEW: usize = 3;
+        /// Errors of a difference by which one may be behind that ends near the best.
+        const ERRORS: f64 = 2.5;
         let mut alive: Vec<Descent> = hypotheses
             .map(|start| Descent::start(self.atlas(), start))
             .collect();
-        for &Rung { round, behind, share } in rounds {
+        for &Rung {
+            round,
+            behind,
+            behind_one,
+            share,
+        } in rounds
+        {
             if alive.is_empty() {
                 break;
             }
@@ -108,6 +129,10 @@ impl Search<'_> {
             };
             let (best, error) = (first.score, first.score_error);
             let (hopeless, fits) = (is_hopeless(first), first.fits());
+            let behind = match first.hypothesis.fitted(self.atlas()) {
+                0 | 1 => behind_one,
+                _ => behind,
+            };
             let bar = best.max(reached);
             let may_be_chance = |d: &Descent| ERRORS * error.hypot(d.score_error);
             alive.retain(|d| d.within_reach() >= bar - behind.max(share * bar).max(may_be_chance(d)));
@@ -170,13 +195,23 @@ impl Search<'_> {
         self.settle_hunted(self.hunted_again(descents, Moved::Little))
     }
 
+    /// The same of what may be listed but hardly claimed: rivals are not told apart any closer.
+    pub(super) fn settle_roughly(&self, descents: Vec<Descent>) -> Vec<Found> {
+        self.sorted(&self.ends(&self.hunted_again(descents, Moved::Far)))
+    }
+
     fn settle_hunted(&self, descents: Vec<Descent>) -> Vec<Found> {
-        let settled = (descents.par_iter())
+        self.sorted(&self.closer(self.ends(&descents)))
+    }
+
+    fn ends(&self, descents: &[Descent]) -> Vec<Settled> {
+        (descents.par_iter())
             .filter_map(|descent| self.trial.settle(descent))
-            .collect();
-        let mut found: Vec<Found> = (self.closer(settled).iter())
-            .map(|settled| self.found(settled))
-            .collect();
+            .collect()
+    }
+
+    fn sorted(&self, settled: &[Settled]) -> Vec<Found> {
+        let mut found: Vec<Found> = settled.iter().map(|settled| self.found(settled)).collect();
         sort(&mut found);
         self.without_repeats(found, |found| &found.hypothesis)
     }
@@ -269,17 +304,16 @@ impl Search<'_> {
         descents
     }
 
-    /// Simulates the best hypothesis more often, and still more if others explain nearly as much; not if all leave far too
-    /// much.
+    /// Simulates the best hypothesis more often, and still more if others explain nearly as much; not if it leaves far too much, or
+    /// surely something and is not to be claimed.
     fn closer(&self, settled: Vec<Settled>) -> Vec<Settled> {
         const CLOSE: f64 = 10.0;
         const CLOSE_SETS_OF_ALL: u64 = 240;
         /// Laps of a data set of which that many are simulated; of smaller ones more, in the same time.
         const USUAL_LAPS: u64 = 80;
         let best = (settled.iter().map(|s| s.refined.score)).fold(f64::NEG_INFINITY, f64::max);
-        let leaves = |s: &Settled| Departures::new(&s.refined.fit.residual, &self.atlas().layout).omnibus_p();
         let first = settled.iter().find(|s| s.refined.score == best);
-        if first.is_some_and(|first| leaves(first) < HOPELESS_P) {
+        if first.is_some_and(|first| is_no_answer(&self.found(first).explanation)) {
             return settled;
         }
         let error = |s: &Settled| s.refined.fit.gain_error;

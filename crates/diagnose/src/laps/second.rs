@@ -42,7 +42,10 @@ impl Search<'_> {
                 Promise::None => {}
                 // Sizes that jump are rough.
                 Promise::Little(_) if jumps => {}
-                Promise::Little(pairs) => return self.try_rounds(pairs.iter(), &ROUNDS_BESIDE),
+                Promise::Little(pairs) => {
+                    let descents = self.descend(pairs.iter(), &ROUNDS_BESIDE, f64::NEG_INFINITY);
+                    return self.settle_roughly(descents);
+                }
                 Promise::Enough(pairs) => {
                     if let Some(closer) = self.with_closer_sizes(single) {
                         found.insert(0, closer);

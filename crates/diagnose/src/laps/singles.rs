@@ -41,8 +41,8 @@ impl Search<'_> {
     fn auditioned<'s>(&self, screened: &'s [Screened], listed: &[&'s Screened]) -> Vec<&'s Screened> {
         const HEARD: usize = 20;
         const SHARE: f64 = 0.5;
-        const SETS: u64 = 8;
-        const TAKEN: usize = 4;
+        /// Data sets by which those that are left are told apart, and how many of them then are (a race).
+        const RACE: [(u64, usize); 2] = [(3, 10), (8, 4)];
         let Some(best) = screened.first().filter(|best| best.score < WEAK) else {
             return Vec::new();
         };
@@ -57,19 +57,20 @@ impl Search<'_> {
                 heard.push(candidate);
             }
         }
-        let score = |candidate: &'s Screened| {
-            let sets = self.atlas().enough(SETS, 1);
-            let simulated = self.trial.evaluate(&candidate.hypothesis, sets)?;
+        let score = |candidate: &'s Screened, sets: u64| {
+            let simulated = (self.trial).evaluate(&candidate.hypothesis, self.atlas().enough(sets, 1))?;
             let fit = self.trial.fit(&simulated)?;
             Some((self.atlas().score_of(&candidate.hypothesis, fit.gain), candidate))
         };
-        let mut scored: Vec<(f64, &Screened)> = heard.into_par_iter().filter_map(score).collect();
-        scored.sort_by(|a, b| b.0.total_cmp(&a.0));
-        scored
-            .into_iter()
-            .take(TAKEN)
-            .map(|(_, candidate)| candidate)
-            .collect()
+        for (sets, taken) in RACE {
+            let scored = (heard.into_par_iter()).filter_map(|candidate| score(candidate, sets));
+            let mut scored: Vec<(f64, &Screened)> = scored.collect();
+            scored.sort_by(|a, b| b.0.total_cmp(&a.0));
+            heard = (scored.into_iter().take(taken))
+                .map(|(_, candidate)| candidate)
+                .collect();
+        }
+        heard
     }
 
     /// The screened hypotheses worth a simulation: each probe in its best pattern, and without it, of one effect the best two.

@@ -3,6 +3,7 @@
 use sim::Pattern;
 
 use super::search::{Found, STRONG};
+use super::tests_of_fit::HOPELESS_P;
 use crate::{Explanation, Verdict};
 
 /// Probability of what is left below which something is left that is worth a search, however small a share it is.
@@ -65,6 +66,12 @@ pub(super) fn is_doubtful(explanation: &Explanation, share: f64) -> bool {
 /// Whether names are claimed.
 pub(super) fn is_claimed(best: &Explanation) -> bool {
     verdict_of(best) != Verdict::Unexplained && !best.has_no_name()
+}
+
+/// Whether an explanation leaves far too much, or surely something and is not to be claimed.
+pub(super) fn is_no_answer(best: &Explanation) -> bool {
+    !best.leaves_more_likely_than(HOPELESS_P)
+        || verdict_of(best) == Verdict::Unexplained && !best.leaves_more_likely_than(SURELY_P)
 }
 
 /// Whether an explanation has a size by run or by time, which may follow what a further effect does.
@@ -289,6 +296,24 @@ mod tests {
                 claimed,
                 "{times} {share} {verdict:?}"
             );
+        }
+    }
+
+    #[test]
+    fn what_is_surely_left_by_what_is_not_claimed_is_no_answer() {
+        let one = ["wheel-scale"];
+        for (p, share, score, no_answer) in [
+            (0.3, 0.9, 500.0, false),
+            // It may be chance yet, or is next to nothing.
+            (1e-5, 0.9, 500.0, false),
+            (1e-5, 0.985, 500.0, false),
+            (1e-9, 0.9, 500.0, true),
+            // Claimed in part, unless far too much is left to look any closer.
+            (1e-9, 0.99, 5000.0, false),
+            (1e-30, 0.99, 5000.0, true),
+        ] {
+            let found = by(&one, p, share, score);
+            assert_eq!(is_no_answer(&found), no_answer, "{p} {share} {score}");
         }
     }
 
