@@ -16,7 +16,7 @@ use super::verdict::is_no_answer;
 pub(super) struct Rung {
     round: Round,
     behind: f64,
-    /// The log-likelihood behind a best one of one number: parabolas in several promise more than they keep.
+    /// The log-likelihood behind a best one of one number: one of several seems better in the course of the rounds than in the end.
     behind_one: f64,
     share: f64,
 }
