@@ -34,6 +34,11 @@ impl Rung {
     const fn of_one(self, behind_one: f64) -> Self {
         Self { behind_one, ..self }
     }
+
+    /// The log-likelihood behind a best one of so many numbers.
+    fn behind_a_best_of(&self, numbers: usize) -> f64 {
+        if numbers > 1 { self.behind } else { self.behind_one }
+    }
 }
 
 /// Those of single effects.
@@ -105,17 +110,12 @@ impl Search<'_> {
         /// Descents that go on where none seems to come to an end, or the others seem to lose.
         const FEW: usize = 3;
         /// Errors of a difference by which one may be behind that ends near the best.
-        const ERRORS: f64 = 2.5;
+        const ERRORS_BEHIND: f64 = 2.5;
         let mut alive: Vec<Descent> = hypotheses
             .map(|start| Descent::start(self.atlas(), start))
             .collect();
-        for &Rung {
-            round,
-            behind,
-            behind_one,
-            share,
-        } in rounds
-        {
+        for rung in rounds {
+            let round = rung.round;
             if alive.is_empty() {
                 break;
             }
@@ -129,13 +129,10 @@ impl Search<'_> {
             };
             let (best, error) = (first.score, first.score_error);
             let (hopeless, fits) = (is_hopeless(first), first.fits());
-            let behind = match first.hypothesis.fitted(self.atlas()) {
-                0 | 1 => behind_one,
-                _ => behind,
-            };
+            let behind = rung.behind_a_best_of(first.hypothesis.fitted(self.atlas()));
             let bar = best.max(reached);
-            let may_be_chance = |d: &Descent| ERRORS * error.hypot(d.score_error);
-            alive.retain(|d| d.within_reach() >= bar - behind.max(share * bar).max(may_be_chance(d)));
+            let may_be_chance = |d: &Descent| ERRORS_BEHIND * error.hypot(d.score_error);
+            alive.retain(|d| d.within_reach() >= bar - behind.max(rung.share * bar).max(may_be_chance(d)));
             alive = self.without_repeats(alive, |descent| &descent.hypothesis);
             if fits {
                 let others = alive.split_off(FEW.min(alive.len()));
