@@ -1,5 +1,6 @@
 //! The last look about the answer: its sizes, their errors, and the sizes without each of the runs.
 
+use nalgebra::DVector;
 use sim::Setting;
 
 use super::hypothesis::Hypothesis;
@@ -22,16 +23,34 @@ pub(super) struct LastLook {
     about: Hypothesis,
     freedoms: Vec<Freedom>,
     local: Option<Local>,
+    moves: DVector<f64>,
 }
 
 /// Looks at most: sizes that leave the parabolas, or turn out less certain, are looked about again.
 const LOOKS: usize = 2;
+/// Data sets at all points together, and where so few leave slopes noisy.
+const FEW: u64 = 36;
+const ALL: u64 = 100;
 /// Errors, as multiples of those that a look was made for, with which it was too narrow.
 const LESS_CERTAIN: f64 = 2.0;
 /// Standard errors that a parabola reaches to either side.
 const REACH: f64 = 3.0;
 /// The least share of a step to look over: a step of nothing tells nothing.
 const LEAST: f64 = 1e-3;
+
+impl LastLook {
+    /// Whether sizes stayed where their parabolas were made, and are not far less certain than these were made for.
+    fn is_as_certain_as_thought(&self, widest: &[Freedom]) -> bool {
+        let certain = (self.errors.iter().zip(widest)).all(|((freedom, error), widest)| {
+            freedom.step == widest.step || REACH * error < LESS_CERTAIN * freedom.step
+        });
+        certain && are_within_steps(&self.moves, &self.freedoms)
+    }
+
+    fn is_noisy(&self) -> bool {
+        self.local.as_ref().is_some_and(Local::is_noisy)
+    }
+}
 
 impl Trial<'_> {
     /// Looks closely about a hypothesis whose numbers have these errors.
@@ -44,35 +63,21 @@ impl Trial<'_> {
             about: hypothesis.clone(),
             freedoms: Vec::new(),
             local: None,
+            moves: DVector::zeros(0),
         };
         let widest = hypothesis.freedoms(self.atlas);
-        for _ in 0..LOOKS {
+        for at in 1..=LOOKS {
             let freedoms: Vec<Freedom> = (widest.iter().zip(&look.errors))
                 .map(|(widest, (_, error))| widest.over(REACH * error, (LEAST, 1.0)))
                 .collect();
-            let Some(mut local) = self.local_until_clear(&look.found, &freedoms) else {
+            let Some(next) = self.look_once(&look.found, &freedoms, FEW) else {
                 break;
             };
-            local.columns = local.columns.into_iter().map(Column::without_noise).collect();
-            let Nearest { moves, errors, .. } =
-                self.nearest(&local.center, &local.scatter, &local.columns, &freedoms);
-            let found = self
-                .atlas
-                .quantised(self.atlas.with_moves(&look.found, &freedoms, &moves));
-            let certain = (errors.iter().zip(&freedoms))
-                .zip(&widest)
-                .all(|((error, freedom), widest)| {
-                    freedom.step == widest.step || REACH * error < LESS_CERTAIN * freedom.step
-                });
-            let holds = certain && are_within_steps(&moves, &freedoms);
-            look = LastLook {
-                errors: freedoms.iter().copied().zip(errors).collect(),
-                intervals: Vec::new(),
-                about: look.found,
-                found,
-                freedoms,
-                local: Some(local),
-            };
+            let holds = next.is_as_certain_as_thought(&widest);
+            let clearer = (next.is_noisy() && (holds || at == LOOKS))
+                .then(|| self.look_once(&look.found, &freedoms, ALL))
+                .flatten();
+            look = clearer.unwrap_or(next);
             if holds {
                 break;
             }
@@ -83,20 +88,27 @@ impl Trial<'_> {
         look
     }
 
-    /// The neighbourhood of a hypothesis, with more data sets where few leave it noisy.
-    fn local_until_clear(&self, hypothesis: &Hypothesis, freedoms: &[Freedom]) -> Option<Local> {
-        /// Data sets at all points together.
-        const FEW: u64 = 36;
-        const ALL: u64 = 100;
-        /// The least and the most at each of them.
+    /// One look about a hypothesis, with so many data sets in all; `None` where the robot crashes.
+    fn look_once(&self, about: &Hypothesis, freedoms: &[Freedom], of_all: u64) -> Option<LastLook> {
+        /// The least and the most data sets at each point.
         const EACH: (u64, u64) = (6, 32);
         let points = 2 * freedoms.len() as u64 + 1;
-        let local = |of_all: u64| {
-            let sets = (of_all / points).clamp(EACH.0, EACH.1);
-            self.local(hypothesis, freedoms, self.atlas.enough(sets, points))
-        };
-        let few = local(FEW)?;
-        if few.is_noisy() { local(ALL) } else { Some(few) }
+        let sets = (of_all / points).clamp(EACH.0, EACH.1);
+        let mut local = self.local(about, freedoms, self.atlas.enough(sets, points))?;
+        local.columns = local.columns.into_iter().map(Column::without_noise).collect();
+        let Nearest { moves, errors, .. } =
+            self.nearest(&local.center, &local.scatter, &local.columns, freedoms);
+        Some(LastLook {
+            found: self
+                .atlas
+                .quantised(self.atlas.with_moves(about, freedoms, &moves)),
+            errors: freedoms.iter().copied().zip(errors).collect(),
+            intervals: Vec::new(),
+            about: about.clone(),
+            freedoms: freedoms.to_vec(),
+            moves,
+            local: Some(local),
+        })
     }
 
     /// For each run the effects with sizes fitted to the other runs alone, by the parabolas of the last look; a

@@ -28,6 +28,13 @@ pub(super) struct Fit {
     pub(super) gain_error: f64,
 }
 
+impl Fit {
+    /// The gain with what the simulation's own error is expected to take of it: rounds simulate more or less often.
+    pub(super) fn fair_gain(&self) -> f64 {
+        self.gain + self.lost_to_doubt
+    }
+}
+
 impl Trial<'_> {
     /// How well a simulated hypothesis explains the data; `None` if it was simulated too seldom to know its scatter.
     pub(super) fn fit(&self, simulated: &Evaluated) -> Option<Fit> {
@@ -54,7 +61,7 @@ impl Trial<'_> {
                 kept.map(|(set, summary)| (set, summary.clone())).unzip();
             let declared: Vec<&Expectation> = sets.iter().map(|&set| &self.atlas.samples[set]).collect();
             let fit = self.fit(&self.atlas.evaluated(summaries, &declared, simulated.doubt.alike))?;
-            Some(fit.gain + fit.lost_to_doubt)
+            Some(fit.fair_gain())
         };
         let gains: Vec<f64> = (0..PARTS).filter_map(gain_without).collect();
         let count = gains.len() as f64;

@@ -4,12 +4,13 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use sim::Stage;
 
-use super::atlas::Atlas;
+use super::atlas::{Atlas, White};
 use super::hypothesis::Hypothesis;
-use super::likeliest::Likeliest;
+use super::likeliest::{Likeliest, Slopes};
 use super::likelihood::Fit;
 use super::parabola::{Column, Local, Nearest};
 use super::part::{Freedom, Part, Shape};
+use super::rounds::ERRORS;
 use super::screen::price;
 use super::simulated::Evaluated;
 use super::tests_of_fit::{Departures, HOPELESS_P, SIGNIFICANT_P};
@@ -96,6 +97,10 @@ pub(super) struct Descent {
     pub(super) remainder: Option<Departures>,
     /// What was seen about it, and the moves since.
     near: Option<(Local, DVector<f64>)>,
+    /// What was seen of the likelihood itself about its only number.
+    slopes: Slopes,
+    /// Where it was last looked around in a full round.
+    seen: Option<Seen>,
     /// How often it was looked around.
     looks: u32,
     /// Whether the moves stayed within the steps of the last look.
@@ -106,6 +111,32 @@ pub(super) struct Descent {
     found: bool,
     /// The hypothesis simulated as often as at the end, if it was.
     end: Option<Evaluated>,
+}
+
+/// A hypothesis that was looked around in a full round.
+#[derive(Debug, Clone)]
+struct Seen {
+    hypothesis: Hypothesis,
+    /// Log-likelihood gained by it as it is, and the standard deviation of that for the simulation's own error.
+    gain: f64,
+    error: f64,
+}
+
+impl Seen {
+    fn new(hypothesis: &Hypothesis, fit: &Fit) -> Self {
+        Self {
+            hypothesis: hypothesis.clone(),
+            gain: fit.fair_gain(),
+            error: fit.gain_error,
+        }
+    }
+
+    /// Whether this is no better than what led to it, nor so much worse that it went too far: what parabolas promise is noise then.
+    fn is_no_better_than(&self, before: &Self) -> bool {
+        const BETTER: f64 = 1.0;
+        let gained = self.gain - before.gain;
+        gained < BETTER && -gained < ERRORS * self.error.hypot(before.error)
+    }
 }
 
 impl Descent {
@@ -120,6 +151,8 @@ impl Descent {
             progress: f64::INFINITY,
             remainder: None,
             near: None,
+            slopes: Slopes::default(),
+            seen: None,
             looks: 0,
             holds: false,
             rests: freedoms.is_empty(),
@@ -133,6 +166,8 @@ impl Descent {
     pub(super) fn with_held(self, known: &[Part]) -> Self {
         Self {
             hypothesis: self.hypothesis.with_held(known),
+            slopes: Slopes::default(),
+            seen: None,
             found: false,
             end: None,
             ..self
@@ -201,7 +236,7 @@ impl Trial<'_> {
     fn weigh(&self, descent: Descent, round: Round) -> Option<Descent> {
         let center = self.evaluate(&descent.hypothesis, self.atlas.enough(round.sets(), 1))?;
         let fit = self.fit_with_error(&center)?;
-        let gain = fit.gain + fit.lost_to_doubt;
+        let gain = fit.fair_gain();
         let score = self.atlas.score_of(&descent.hypothesis, gain);
         let found = round == Round::Full;
         Some(Descent {
@@ -224,32 +259,40 @@ impl Trial<'_> {
             hypothesis, freedoms, ..
         } = &descent;
         let sets = self.atlas.enough(round.sets_of_a_step(), 1);
-        if let Some(likeliest) = self.likeliest(hypothesis, freedoms, &local, sets) {
-            return Some(self.atlas.climbed(descent, &likeliest, round));
+        if let Some(likeliest) = self.likeliest(hypothesis, freedoms, &local, sets, &descent.slopes) {
+            return Some(self.atlas.climbed(descent, likeliest, round));
         }
         local.sides.clear();
         let nearest = self.nearest(&local.center, &local.scatter, &local.columns, freedoms);
+        let mut here = None;
+        let (gain, score_error) = if round == Round::Rough {
+            let fit = &nearest.fit;
+            let too_little = (self.atlas.least_left(hypothesis) - fit.residual.norm_squared()).max(0.0);
+            (fit.fair_gain() - 0.5 * too_little, fit.gain_error)
+        } else {
+            let sets = self.atlas.enough(round.sets(), 1);
+            let center = self.evaluate_more(hypothesis, local.center.clone(), sets)?;
+            let fit = self.fit_with_error(&center)?;
+            // Several effects go farther than one on parabolas that are a little off.
+            if full && hypothesis.parts.len() == 1 {
+                let seen = Seen::new(hypothesis, &fit);
+                if descent
+                    .seen
+                    .as_ref()
+                    .is_some_and(|before| seen.is_no_better_than(before))
+                {
+                    return Some(self.atlas.stalled(descent, seen, &nearest.fit.residual));
+                }
+                here = Some(seen);
+            }
+            (self.hoped_gain(hypothesis, &fit, nearest.hoped), fit.gain_error)
+        };
         let Descent {
             hypothesis,
             mut freedoms,
             looks,
             ..
         } = descent;
-        let center = &local.center;
-        let (gain, score_error) = if round == Round::Rough {
-            let Fit {
-                gain,
-                lost_to_doubt,
-                gain_error,
-                residual,
-            } = &nearest.fit;
-            let too_little = (self.atlas.least_left(&hypothesis) - residual.norm_squared()).max(0.0);
-            (gain + lost_to_doubt - 0.5 * too_little, *gain_error)
-        } else {
-            let sets = self.atlas.enough(round.sets(), 1);
-            let center = self.evaluate_more(&hypothesis, center.clone(), sets)?;
-            self.likely_gain(&hypothesis, &center, nearest.hoped)?
-        };
         let Nearest { moves, errors, .. } = nearest;
         let hypothesis = self.atlas.with_moves(&hypothesis, &freedoms, &moves);
         let found = full && is_settled(&moves, &nearest.covariance, &freedoms);
@@ -267,6 +310,8 @@ impl Trial<'_> {
             score_error,
             progress: score - descent.score,
             near: Some((local, moves)),
+            slopes: Slopes::default(),
+            seen: here,
             looks: looks + 1,
             holds,
             rests: false,
@@ -294,7 +339,8 @@ impl Trial<'_> {
             .map(|(column, moved)| column.from(*moved))
             .collect();
         let nearest = self.nearest(&center, &local.scatter, &columns, &freedoms);
-        let (gain, score_error) = self.likely_gain(&descent.hypothesis, &center, nearest.hoped)?;
+        let fit = self.fit_with_error(&center)?;
+        let gain = self.hoped_gain(&descent.hypothesis, &fit, nearest.hoped);
         let Nearest { moves, errors, .. } = nearest;
         let found = full && is_settled(&moves, &nearest.covariance, &freedoms);
         let remainder = Some(Departures::new(&nearest.fit.residual, &self.atlas.layout));
@@ -309,11 +355,13 @@ impl Trial<'_> {
         let score = self.atlas.score_of(&hypothesis, gain);
         Some(Descent {
             score,
-            score_error,
+            score_error: fit.gain_error,
             progress: score - descent.score,
             remainder,
             holds: holds && are_within_steps(&moved, &freedoms),
             near: Some((local, moved)),
+            slopes: Slopes::default(),
+            seen: None,
             looks,
             rests: false,
             found,
@@ -325,13 +373,10 @@ impl Trial<'_> {
     }
 
     /// The log-likelihood gained by a simulated hypothesis once its numbers have moved, which is hoped to gain so much more: never
-    /// so much that less would be left than chance leaves. What the simulation's own error is expected to cost is added back:
-    /// rounds simulate more or less often. Also its standard deviation for that error.
-    fn likely_gain(&self, hypothesis: &Hypothesis, simulated: &Evaluated, hoped: f64) -> Option<(f64, f64)> {
-        let fit = self.fit_with_error(simulated)?;
+    /// so much that less would be left than chance leaves.
+    fn hoped_gain(&self, hypothesis: &Hypothesis, fit: &Fit, hoped: f64) -> f64 {
         let most = 0.5 * (fit.residual.norm_squared() - self.atlas.least_left(hypothesis));
-        let gain = fit.gain + fit.lost_to_doubt + hoped.min(most.max(0.0));
-        Some((gain, fit.gain_error))
+        fit.fair_gain() + hoped.min(most.max(0.0))
     }
 
     /// A hypothesis at its most likely sizes, simulated often enough to judge it; `None` where the robot crashes, and where
@@ -374,13 +419,39 @@ impl Trial<'_> {
 }
 
 impl Atlas {
+    /// A descent that came to a hypothesis which is no better than what it came from: the better of the two.
+    fn stalled(&self, descent: Descent, here: Seen, left: &White) -> Descent {
+        let better = match descent.seen {
+            Some(before) if before.gain > here.gain => before,
+            _ => here,
+        };
+        let score = self.score_of(&better.hypothesis, better.gain);
+        Descent {
+            score,
+            score_error: better.error,
+            progress: score - descent.score,
+            remainder: Some(Departures::new(left, &self.layout)),
+            hypothesis: better.hypothesis,
+            looks: descent.looks + 1,
+            rests: true,
+            found: true,
+            end: None,
+            near: None,
+            slopes: Slopes::default(),
+            seen: None,
+            holds: false,
+            freedoms: descent.freedoms,
+            errors: descent.errors,
+        }
+    }
+
     /// A descent of one number moved to where the likelihood is highest about it.
-    fn climbed(&self, descent: Descent, to: &Likeliest, round: Round) -> Descent {
+    fn climbed(&self, descent: Descent, to: Likeliest, round: Round) -> Descent {
         let full = round == Round::Full;
         let mut freedoms = descent.freedoms;
         let hypothesis = descent.hypothesis.moved(self, &[(freedoms[0], to.moved)]);
-        // Points one and a half errors away tell most of a top.
-        freedoms[0] = freedoms[0].over(1.5 * to.error, (0.3, 2.0));
+        // Points three errors away tell a top through noise too.
+        freedoms[0] = freedoms[0].over(3.0 * to.error, (0.3, 2.0));
         let score = self.score_of(&hypothesis, to.gain + to.hoped);
         Descent {
             score,
@@ -388,6 +459,8 @@ impl Atlas {
             progress: score - descent.score,
             remainder: full.then(|| Departures::new(&to.fit.residual, &self.layout)),
             near: None,
+            slopes: to.slopes,
+            seen: None,
             looks: descent.looks + 1,
             holds: false,
             // With so few data sets a top may be anywhere.

@@ -1,5 +1,6 @@
 //! Causes that are in no list.
 
+use rayon::prelude::*;
 use sim::{Pattern, Setting, Stage, Vec2, unlisted_on_floor};
 
 use super::channels::{Channel, channels};
@@ -9,7 +10,7 @@ use super::groups::{area_variants, unlisted_variants};
 use super::leads::{By, Lead, price};
 use super::refined::{Refined, together};
 use super::repeat::repeats;
-use super::search::{FAULTS, STEPS, Search, screened};
+use super::search::{FAULTS, FIRST_STEPS, STEPS, Search, least_in_reach, screened};
 use super::settling::settling;
 use super::wheels::out_of_round;
 use crate::Cause;
@@ -114,15 +115,26 @@ impl Search<'_> {
                 starts.push((amount, place));
             }
         }
-        let refined = |&(amount, place): &(f64, Vec2), softness: f64| {
+        let start = |&(amount, place): &(f64, Vec2), softness: f64| {
             let mut area = variant.values.clone();
             area[WORDS..WORDS + 3].copy_from_slice(&[amount, place.x, place.y]);
             area[WORDS + 4] = softness;
-            let setting = Setting::constant(variant.spec, area);
-            together(&self.evidence, &[(variant.clone(), setting)], self.total(), STEPS)
+            Setting::constant(variant.spec, area)
         };
-        let all = (starts.iter()).flat_map(|start| SOFTNESSES.map(|softness| refined(start, softness)));
-        let mut all: Vec<Refined> = all.flatten().collect();
+        let starts = (starts.iter()).flat_map(|place| SOFTNESSES.map(|softness| start(place, softness)));
+        let starts: Vec<Setting> = starts.collect();
+        let first: Vec<Refined> = (starts.into_par_iter())
+            .filter_map(|start| {
+                let area = [(variant.clone(), start)];
+                together(&self.evidence, &area, self.total(), FIRST_STEPS)
+            })
+            .collect();
+        let least = least_in_reach(first.iter());
+        let hopeful = first.into_par_iter().filter(|area| area.score() >= least);
+        let variants = std::slice::from_ref(&variant);
+        let mut all: Vec<Refined> = hopeful
+            .map(|area| area.further(&self.evidence, variants, self.total(), STEPS - FIRST_STEPS))
+            .collect();
         all.sort_by(|a, b| b.gain.total_cmp(&a.gain));
         let (best, others) = all.split_first_mut()?;
         // Where a robot that crosses it on one line sees both its ends, a larger area farther aside does the same.
