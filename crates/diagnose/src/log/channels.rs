@@ -22,6 +22,11 @@ impl Channel {
     pub(super) fn gain_of_memory(&self) -> f64 {
         -0.5 * self.count as f64 * (-self.correlation.powi(2)).ln_1p()
     }
+
+    /// What a mean that makes innovations too wide may gain at most in log-likelihood.
+    pub(super) fn gain_of_width(&self) -> f64 {
+        0.5 * self.count as f64 * (self.mean_square - 1.0).max(0.0)
+    }
 }
 
 /// Moments of the innovations.

@@ -1,6 +1,6 @@
 //! The search for effects through what linear algebra ranks and refinements decide.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use rayon::prelude::*;
 use sim::{Setting, World};
@@ -12,6 +12,7 @@ use super::evidence::Evidence;
 use super::filter::{MEASURED, Trace};
 use super::leads::{By, Lead, leads, least_p, most, shortlist};
 use super::noise::{Factor, by_chance, noises, p_among, p_among_repeats, with_memory};
+use super::pairs::Pair;
 use super::refine::jumps;
 use super::refined::{Refined, pursue, together};
 use super::repeat::repeats;
@@ -82,8 +83,10 @@ pub(super) struct Search<'a> {
     /// Control steps that are used.
     pub(super) control_steps: usize,
     pub(super) detectable: Vec<Detectable>,
-    /// The last screening and its settings.
-    screened: Option<(Vec<Setting>, Arc<Screened<'a>>)>,
+    /// The last screenings and their settings, the latest last.
+    screened: Vec<(Vec<Setting>, Arc<Screened<'a>>)>,
+    /// The best pairs over the columns of the declared model, once they were asked for.
+    pub(super) joint: OnceLock<Vec<Pair>>,
 }
 
 /// Every run in its world, filtered, and the leads over them.
@@ -114,7 +117,8 @@ impl<'a> Search<'a> {
             rounding_counts,
             rounding_gain,
             detectable: Vec::new(),
-            screened: None,
+            screened: Vec::new(),
+            joint: OnceLock::new(),
         })
     }
 
@@ -124,11 +128,16 @@ impl<'a> Search<'a> {
 
     /// The screening of all variants at given settings.
     pub(super) fn screen(&mut self, settings: &[Setting]) -> Option<Arc<Screened<'a>>> {
-        if let Some((_, found)) = self.screened.as_ref().filter(|last| last.0 == settings) {
+        /// What is come back to: the best effect, after another look at a cause without a name.
+        const KEPT: usize = 2;
+        if let Some((_, found)) = self.screened.iter().find(|screened| screened.0 == settings) {
             return Some(Arc::clone(found));
         }
         let found = Arc::new(screened(&self.evidence, settings, &self.variants)?);
-        self.screened = Some((settings.to_vec(), Arc::clone(&found)));
+        if self.screened.len() == KEPT {
+            self.screened.remove(0);
+        }
+        self.screened.push((settings.to_vec(), Arc::clone(&found)));
         Some(found)
     }
 
@@ -285,8 +294,10 @@ impl<'a> Search<'a> {
 
     /// Further effects, and whether what is left matters.
     pub(super) fn finish(&mut self, leads: &[Lead]) {
-        self.second(leads);
-        self.sort();
+        if !self.has_no_name(leads) {
+            self.second(leads);
+            self.sort();
+        }
         self.judge();
         self.settle_beside_unnamed();
         if let (Some(best), None, None) = (self.found.first_mut(), self.rounding_counts, &self.unnamed) {
@@ -339,8 +350,10 @@ impl<'a> Search<'a> {
         all.into_iter().fold(0.0, f64::max)
     }
 
-    /// Notes what is left beside an explanation.
-    pub(super) fn settle(&mut self, explanation: &Refined, traces: &[(World<'a>, Trace)], leads: &[Lead]) {
+    /// Notes what is left beside an explanation, and what gains most there; `None` if it cannot drive so.
+    pub(super) fn settle(&mut self, explanation: &Refined) -> Option<Arc<Screened<'a>>> {
+        let screened = self.screen(&explanation.settings)?;
+        let (traces, leads) = &*screened;
         self.channels = channels(traces);
         let (left, gain) = (most(leads), explanation.gain);
         self.remainder = Remainder {
@@ -349,6 +362,7 @@ impl<'a> Search<'a> {
             share: left / (left + gain).max(1e-9),
             p: least_p(leads),
         };
+        Some(screened)
     }
 
     /// Notes what is left beside a cause without a name. Not beside a wheel out of round: it begins each run at another angle, and its
@@ -358,9 +372,7 @@ impl<'a> Search<'a> {
         let Some(refined) = unnamed.and_then(|unnamed| unnamed.refined.clone()) else {
             return;
         };
-        if let Some(screened) = self.screen(&refined.settings) {
-            self.settle(&refined, &screened.0, &screened.1);
-        }
+        self.settle(&refined);
     }
 }
 

@@ -8,7 +8,7 @@ use sim::Setting;
 use super::catalogue::Variant;
 use super::leads::{By, Lead, of_constant_size, shortlist};
 use super::noise::{Factor, by_chance, noises, p_among_repeats};
-use super::pairs::pairs;
+use super::pairs::{Pair, pairs};
 use super::refine::jumps;
 use super::refined::{Refined, together};
 use super::search::{FAULTS, FIRST_STEPS, MATTERS, SIGNIFICANT_P, STEPS, Search, least_in_reach};
@@ -22,11 +22,10 @@ impl Search<'_> {
         let Some(best) = self.found.first().cloned() else {
             return;
         };
-        let Some(screened) = self.screen(&best.settings) else {
+        let Some(screened) = self.settle(&best) else {
             return;
         };
-        let (traces, leads) = &*screened;
-        self.settle(&best, traces, leads);
+        let (_, leads) = &*screened;
         let noise = noises(&self.evidence, &best.settings, self.total() + best.gain);
         let left = noise.iter().map(|n| n.gain).fold(0.0, f64::max) / best.gain.max(1e-9);
         if self.remainder.p.min(by_chance(&noise)) >= SIGNIFICANT_P || self.remainder.share.max(left) < FAULTS
@@ -48,7 +47,12 @@ impl Search<'_> {
         }
         if best.by == By::Constant {
             let mut starts = self.beside(&best, leads);
-            starts.extend(self.joint(first));
+            let joint = self.joint(first).iter().map(|pair| &pair.parts);
+            starts.extend(joint.map(|parts| {
+                parts
+                    .clone()
+                    .map(|(i, setting)| (self.variants[i].clone(), setting))
+            }));
             more.extend(self.pursued_together(&starts));
         }
         // An effect that linear algebra did not see may stand alone.
@@ -66,9 +70,7 @@ impl Search<'_> {
         self.found.extend(more);
         self.sort();
         let best = self.found[0].clone();
-        if let Some(screened) = self.screen(&best.settings) {
-            self.settle(&best, &screened.0, &screened.1);
-        }
+        self.settle(&best);
     }
 
     /// A noise effect beside the best candidate, and beside single effects that explain nearly as much: large noise hides what tells
@@ -122,20 +124,17 @@ impl Search<'_> {
             .collect()
     }
 
-    /// The best pairs over the columns of the declared model, where their refinements begin.
-    fn joint(&self, leads: &[Lead]) -> Vec<Parts> {
+    /// The best pairs over the columns of the declared model, which rank the leads.
+    pub(super) fn joint(&self, leads: &[Lead]) -> &[Pair] {
         const AMONG: usize = 36;
-        let list: Vec<usize> = shortlist(&of_constant_size(leads), &self.variants, AMONG)
-            .iter()
-            .map(|lead| lead.variant)
-            .collect();
-        let Some(traces) = self.evidence.traces(&[]) else {
-            return Vec::new();
-        };
-        let found = pairs(&traces, &self.variants, &list, 3).unwrap_or_default();
-        (found.into_iter())
-            .map(|pair| pair.parts.map(|(i, setting)| (self.variants[i].clone(), setting)))
-            .collect()
+        self.joint.get_or_init(|| {
+            let list = shortlist(&of_constant_size(leads), &self.variants, AMONG);
+            let list: Vec<usize> = list.iter().map(|lead| lead.variant).collect();
+            let traces = self.evidence.traces(&[]);
+            traces.map_or(Vec::new(), |traces| {
+                pairs(&traces, &self.variants, &list, 3).unwrap_or_default()
+            })
+        })
     }
 
     /// Pairs refined together: a few steps, then to the end the best of every two names that may still be the best of all.

@@ -40,6 +40,36 @@ impl Unnamed {
 }
 
 impl Search<'_> {
+    /// Whether a cause without a name leaves nothing that matters where the best effect leaves something, and pairs of effects do not
+    /// promise as much over the columns of the declared model, which rank `first`.
+    pub(super) fn has_no_name(&mut self, first: &[Lead]) -> bool {
+        /// Share of what innovations that are too wide may gain with which pairs may be all there is, and of what the cause gains.
+        const NEARLY: f64 = 0.9;
+        let Some(best) = self.found.first().filter(|best| best.by == By::Constant).cloned() else {
+            return false;
+        };
+        self.settle(&best);
+        if !self.remainder.matters() {
+            return false;
+        }
+        let promised = self.joint(first).first().map_or(0.0, |pair| pair.gain);
+        let too_wide: f64 = self.channels.iter().map(Channel::gain_of_width).sum();
+        if promised > NEARLY * (best.gain + too_wide) {
+            return false;
+        }
+        let unnamed = self.characterise(best.gain.max(promised / NEARLY));
+        let Some(refined) = unnamed.as_ref().and_then(|unnamed| unnamed.refined.clone()) else {
+            return false;
+        };
+        self.settle(&refined);
+        let suffices = !self.remainder.matters();
+        if suffices {
+            self.unnamed = unnamed;
+        }
+        self.settle(&best);
+        suffices
+    }
+
     /// What is left beside the best explanation, and whether that makes it dishonest to name it.
     pub(super) fn judge(&mut self) {
         let gain = self.found.first().map_or(0.0, |best| best.gain);
@@ -58,7 +88,7 @@ impl Search<'_> {
             });
             return;
         }
-        if self.remainder.matters() || self.found.is_empty() {
+        if self.unnamed.is_none() && (self.remainder.matters() || self.found.is_empty()) {
             self.unnamed = self.characterise(gain);
         }
         if self.unnamed.is_none() {
