@@ -23,6 +23,7 @@ pub(super) struct LastLook {
     about: Hypothesis,
     freedoms: Vec<Freedom>,
     local: Option<Local>,
+    /// From there to what was found.
     moves: DVector<f64>,
 }
 

@@ -31,16 +31,16 @@ pub(super) struct Likeliest {
     pub(super) gain: f64,
     pub(super) fit: Fit,
     /// What this look told, and those before.
-    pub(super) slopes: Slopes,
+    pub(super) rises: Rises,
 }
 
 /// How much more likely one number is at some places than at others, as looks about several of these told.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Slopes(Vec<Slope>);
+pub(super) struct Rises(Vec<Rise>);
 
 /// How much more likely a number is at one place than at another; places are from where it is now.
 #[derive(Debug, Clone, Copy)]
-struct Slope {
+struct Rise {
     from: f64,
     to: f64,
     more: f64,
@@ -58,7 +58,7 @@ impl Trial<'_> {
         freedoms: &[Freedom],
         local: &Local,
         sets: u64,
-        before: &Slopes,
+        before: &Rises,
     ) -> Option<Likeliest> {
         let [freedom] = freedoms else {
             return None;
@@ -91,8 +91,8 @@ impl Trial<'_> {
         let gained =
             |moved: f64, evaluated: &Evaluated| Some(self.fit(&more(moved, evaluated)?)?.gain - center.gain);
         let (down, up) = ((down, gained(down, at_down)?), (up, gained(up, at_up)?));
-        let slopes = before.with([down, up], center.gain_error);
-        let top = slopes.top(down, up)?;
+        let rises = before.with([down, up], center.gain_error);
+        let top = rises.top(down, up)?;
         let moved = freedom.possible(top.place);
         let there = hypothesis.moved(self.atlas, &[(*freedom, moved)]);
         Some(Likeliest {
@@ -103,7 +103,7 @@ impl Trial<'_> {
             hoped: top.height,
             gain: center.fair_gain(),
             fit: center,
-            slopes: slopes.from(there.apart(hypothesis, freedom, self.atlas)),
+            rises: rises.from(there.apart(hypothesis, freedom, self.atlas)),
         })
     }
 }
@@ -120,10 +120,10 @@ struct Top {
     between: bool,
 }
 
-impl Slopes {
+impl Rises {
     /// The same with what a look told of places about the one where the number is now.
     fn with(&self, heights: [(f64, f64); 2], error: f64) -> Self {
-        let seen = heights.map(|(to, more)| Slope {
+        let seen = heights.map(|(to, more)| Rise {
             from: 0.0,
             to,
             more,
@@ -134,9 +134,9 @@ impl Slopes {
 
     /// The same once the number has moved.
     fn from(mut self, moved: f64) -> Self {
-        for slope in &mut self.0 {
-            slope.from -= moved;
-            slope.to -= moved;
+        for rise in &mut self.0 {
+            rise.from -= moved;
+            rise.to -= moved;
         }
         self
     }
@@ -185,7 +185,7 @@ impl Slopes {
             .map(|seen| (seen.to - seen.from).abs())
             .fold(0.0, f64::max);
         let (mut normal, mut products) = (Matrix2::zeros(), Vector2::zeros());
-        for Slope {
+        for Rise {
             from,
             to,
             more,
@@ -212,7 +212,7 @@ mod tests {
     const ERROR: f64 = 0.3;
 
     fn top(down: (f64, f64), up: (f64, f64)) -> Option<Top> {
-        Slopes::default().with([down, up], ERROR).top(down, up)
+        Rises::default().with([down, up], ERROR).top(down, up)
     }
 
     #[test]
@@ -252,7 +252,7 @@ mod tests {
         let (mean, noise) = (0.5, 3.0);
         let at = |x: f64| -0.5 * (x - mean).powi(2);
         let far = [-8.0, 8.0].map(|x| (x, at(x) - at(0.0)));
-        let before = Slopes::default().with(far, noise).from(0.0);
+        let before = Rises::default().with(far, noise).from(0.0);
         let near = [(-1.5, 2.0), (1.5, 1.0)];
         let found = before.with(near, noise).top(near[0], near[1]).unwrap();
         assert!((found.place - mean).abs() < 1.0 && (found.error - 1.0).abs() < 0.2);

@@ -6,7 +6,7 @@ use sim::Stage;
 
 use super::atlas::{Atlas, White};
 use super::hypothesis::Hypothesis;
-use super::likeliest::{Likeliest, Slopes};
+use super::likeliest::{Likeliest, Rises};
 use super::likelihood::Fit;
 use super::parabola::{Column, Local, Nearest};
 use super::part::{Freedom, Part, Shape};
@@ -98,7 +98,7 @@ pub(super) struct Descent {
     /// What was seen about it, and the moves since.
     near: Option<(Local, DVector<f64>)>,
     /// What was seen of the likelihood itself about its only number.
-    slopes: Slopes,
+    rises: Rises,
     /// Where it was last looked around in a full round.
     seen: Option<Seen>,
     /// How often it was looked around.
@@ -151,7 +151,7 @@ impl Descent {
             progress: f64::INFINITY,
             remainder: None,
             near: None,
-            slopes: Slopes::default(),
+            rises: Rises::default(),
             seen: None,
             looks: 0,
             holds: false,
@@ -166,7 +166,7 @@ impl Descent {
     pub(super) fn with_held(self, known: &[Part]) -> Self {
         Self {
             hypothesis: self.hypothesis.with_held(known),
-            slopes: Slopes::default(),
+            rises: Rises::default(),
             seen: None,
             found: false,
             end: None,
@@ -259,7 +259,7 @@ impl Trial<'_> {
             hypothesis, freedoms, ..
         } = &descent;
         let sets = self.atlas.enough(round.sets_of_a_step(), 1);
-        if let Some(likeliest) = self.likeliest(hypothesis, freedoms, &local, sets, &descent.slopes) {
+        if let Some(likeliest) = self.likeliest(hypothesis, freedoms, &local, sets, &descent.rises) {
             return Some(self.atlas.climbed(descent, likeliest, round));
         }
         local.sides.clear();
@@ -310,7 +310,7 @@ impl Trial<'_> {
             score_error,
             progress: score - descent.score,
             near: Some((local, moves)),
-            slopes: Slopes::default(),
+            rises: Rises::default(),
             seen: here,
             looks: looks + 1,
             holds,
@@ -360,7 +360,7 @@ impl Trial<'_> {
             remainder,
             holds: holds && are_within_steps(&moved, &freedoms),
             near: Some((local, moved)),
-            slopes: Slopes::default(),
+            rises: Rises::default(),
             seen: None,
             looks,
             rests: false,
@@ -437,7 +437,7 @@ impl Atlas {
             found: true,
             end: None,
             near: None,
-            slopes: Slopes::default(),
+            rises: Rises::default(),
             seen: None,
             holds: false,
             freedoms: descent.freedoms,
@@ -459,7 +459,7 @@ impl Atlas {
             progress: score - descent.score,
             remainder: full.then(|| Departures::new(&to.fit.residual, &self.layout)),
             near: None,
-            slopes: to.slopes,
+            rises: to.rises,
             seen: None,
             looks: descent.looks + 1,
             holds: false,
@@ -570,4 +570,22 @@ fn is_settled(moves: &DVector<f64>, covariance: &DMatrix<f64>, freedoms: &[Freed
         let (moved, error) = (moves[i].abs(), covariance[(i, i)].sqrt());
         moved < SETTLED * error || moved < WITHIN.0 * error && WITHIN.1 * moved < freedoms[i].step
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_gains_nothing_within_noise_is_no_better() {
+        let seen = |gain: f64| Seen {
+            hypothesis: Hypothesis::nothing(),
+            gain,
+            error: 3.0,
+        };
+        // Twice the error of the difference is 8.5.
+        for (gain, no_better) in [(102.0, false), (100.5, true), (92.0, true), (91.0, false)] {
+            assert_eq!(seen(gain).is_no_better_than(&seen(100.0)), no_better, "{gain}");
+        }
+    }
 }
