@@ -313,7 +313,8 @@ fn residual(trace: &Trace) -> Vec<Block> {
             .zip(numbers.named().into_iter().map(|of| of.1))
             .collect::<Vec<_>>()
     };
-    let shown = |q: Quadratic| [format!("{:.0}", q.excess()), probability(q.p)];
+    // What rounds to nothing has no sign.
+    let shown = |q: Quadratic| [format!("{:.0}", q.excess().round() + 0.0), probability(q.p)];
     let remainder = answer.and_then(|answer| answer.remainder.as_ref()).map(named);
     for (i, (name, declared)) in named(&trace.residual).into_iter().enumerate() {
         let left = (remainder.as_ref()).map_or(["-".into(), "-".into()], |left| shown(left[i].1));
