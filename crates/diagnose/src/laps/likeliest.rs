@@ -18,7 +18,7 @@ const VERY_FAR: f64 = 400.0;
 /// Standard errors that are as good as none where the noise of the simulations is as large.
 const NOISY: f64 = 1.5;
 
-/// Where a parabola through the log-likelihoods of a hypothesis and of a step to either side is highest.
+/// Where a parabola through the log-likelihoods of a hypothesis and of a step to either side, and those of looks before, is highest.
 pub(super) struct Likeliest {
     pub(super) moved: f64,
     /// Standard error of the move.
@@ -220,8 +220,8 @@ mod tests {
         let (mean, deviation) = (0.7, 0.4);
         let at = |x: f64| -0.5 * (((x - mean) / deviation).powi(2) - (mean / deviation).powi(2));
         let found = top((-0.5, at(-0.5)), (0.6, at(0.6))).unwrap();
-        assert!((found.place - mean).abs() < 1e-9 && (found.error - deviation).abs() < 1e-9);
-        assert!((found.height - at(mean)).abs() < 1e-9);
+        assert!((found.place - mean).abs() < 1e-12 && (found.error - deviation).abs() < 1e-12);
+        assert!((found.height - at(mean)).abs() < 1e-12);
         assert!(!found.between && top((-0.5, at(-0.5)), (0.8, at(0.8))).unwrap().between);
     }
 
@@ -230,11 +230,7 @@ mod tests {
         // Convex, and rising to a top far outside.
         for (down, up, place) in [(0.5, 2.0, 2.0), (2.0, 0.5, -2.0), (-1.0, 0.99, 2.5)] {
             let found = top((-1.0, down), (1.0, up)).unwrap();
-            assert!(
-                (found.place - place).abs() < 1e-9 && !found.between,
-                "{}",
-                found.place
-            );
+            assert!(found.place == place && !found.between, "{}", found.place);
         }
         // The points are so far apart that means tell more.
         assert!(top((-1.0, -1.1 * FAR), (1.0, -1.2 * FAR)).is_none());

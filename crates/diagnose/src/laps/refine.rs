@@ -432,16 +432,11 @@ impl Atlas {
             progress: score - descent.score,
             remainder: Some(Departures::new(left, &self.layout)),
             hypothesis: better.hypothesis,
-            looks: descent.looks + 1,
             rests: true,
             found: true,
-            end: None,
             near: None,
-            rises: Rises::default(),
             seen: None,
-            holds: false,
-            freedoms: descent.freedoms,
-            errors: descent.errors,
+            ..descent
         }
     }
 

@@ -87,6 +87,8 @@ pub(super) struct Search<'a> {
     screened: Vec<(Vec<Setting>, Arc<Screened<'a>>)>,
     /// The best pairs over the columns of the declared model, once they were asked for.
     pub(super) joint: OnceLock<Vec<Pair>>,
+    /// The group of basis functions that explains most, once that was asked for.
+    pub(super) by_groups: OnceLock<Option<Refined>>,
 }
 
 /// Every run in its world, filtered, and the leads over them.
@@ -119,6 +121,7 @@ impl<'a> Search<'a> {
             detectable: Vec::new(),
             screened: Vec::new(),
             joint: OnceLock::new(),
+            by_groups: OnceLock::new(),
         })
     }
 
@@ -294,7 +297,8 @@ impl<'a> Search<'a> {
 
     /// Further effects, and whether what is left matters.
     pub(super) fn finish(&mut self, leads: &[Lead]) {
-        if !self.has_no_name(leads) {
+        self.unnamed = self.unnamed_before_pairs(leads);
+        if self.unnamed.is_none() {
             self.second(leads);
             self.sort();
         }

@@ -47,12 +47,7 @@ impl Search<'_> {
         }
         if best.by == By::Constant {
             let mut starts = self.beside(&best, leads);
-            let joint = self.joint(first).iter().map(|pair| &pair.parts);
-            starts.extend(joint.map(|parts| {
-                parts
-                    .clone()
-                    .map(|(i, setting)| (self.variants[i].clone(), setting))
-            }));
+            starts.extend(self.joint(first).iter().map(|pair| self.start_of(pair)));
             more.extend(self.pursued_together(&starts));
         }
         // An effect that linear algebra did not see may stand alone.
@@ -135,6 +130,11 @@ impl Search<'_> {
                 pairs(&traces, &self.variants, &list, 3).unwrap_or_default()
             })
         })
+    }
+
+    fn start_of(&self, pair: &Pair) -> Parts {
+        let part = |(i, setting): &(usize, Setting)| (self.variants[*i].clone(), setting.clone());
+        pair.parts.each_ref().map(part)
     }
 
     /// Pairs refined together: a few steps, then to the end the best of every two names that may still be the best of all.

@@ -40,34 +40,28 @@ impl Unnamed {
 }
 
 impl Search<'_> {
-    /// Whether a cause without a name leaves nothing that matters where the best effect leaves something, and pairs of effects do not
-    /// promise as much over the columns of the declared model, which rank `first`.
-    pub(super) fn has_no_name(&mut self, first: &[Lead]) -> bool {
+    /// A cause without a name that leaves nothing that matters where the best effect leaves something, if pairs of effects do not
+    /// promise as much over the columns of the declared model, which rank `first`. What is left is noted beside the best effect.
+    pub(super) fn unnamed_before_pairs(&mut self, first: &[Lead]) -> Option<Unnamed> {
         /// Share of what innovations that are too wide may gain with which pairs may be all there is, and of what the cause gains.
         const NEARLY: f64 = 0.9;
-        let Some(best) = self.found.first().filter(|best| best.by == By::Constant).cloned() else {
-            return false;
-        };
+        let best = (self.found.first())
+            .filter(|best| best.by == By::Constant)?
+            .clone();
         self.settle(&best);
         if !self.remainder.matters() {
-            return false;
+            return None;
         }
         let promised = self.joint(first).first().map_or(0.0, |pair| pair.gain);
         let too_wide: f64 = self.channels.iter().map(Channel::gain_of_width).sum();
         if promised > NEARLY * (best.gain + too_wide) {
-            return false;
+            return None;
         }
-        let unnamed = self.characterise(best.gain.max(promised / NEARLY));
-        let Some(refined) = unnamed.as_ref().and_then(|unnamed| unnamed.refined.clone()) else {
-            return false;
-        };
-        self.settle(&refined);
+        let unnamed = self.characterise(best.gain.max(promised / NEARLY))?;
+        self.settle(unnamed.refined.as_ref()?);
         let suffices = !self.remainder.matters();
-        if suffices {
-            self.unnamed = unnamed;
-        }
         self.settle(&best);
-        suffices
+        suffices.then_some(unnamed)
     }
 
     /// What is left beside the best explanation, and whether that makes it dishonest to name it.
@@ -98,6 +92,18 @@ impl Search<'_> {
 
     /// The group of basis functions that explains most, if it explains more than the best listed effects.
     fn characterise(&self, listed: f64) -> Option<Unnamed> {
+        let refined = self.by_groups.get_or_init(|| self.best_group()).as_ref()?;
+        if refined.gain < listed {
+            return None;
+        }
+        Cause::of(&refined.settings[0]).map(|cause| Unnamed {
+            cause,
+            refined: Some(refined.clone()),
+        })
+    }
+
+    /// The group of basis functions with fewest coefficients of those that explain most.
+    fn best_group(&self) -> Option<Refined> {
         let groups = unlisted_variants();
         let (_, found) = screened(&self.evidence, &[], &groups)?;
         let score = |lead: &Lead| lead.gain - price(lead.fitted, By::Constant);
@@ -108,17 +114,10 @@ impl Search<'_> {
         let variant = &groups[lead.variant];
         let setting = lead.start(variant);
         let refined = together(&self.evidence, &[(variant.clone(), setting)], self.total(), STEPS)?;
-        let refined = match self.on_part_of_the_floor(&refined) {
-            Some(area) if area.score() > refined.score() => area,
-            _ => refined,
-        };
-        if refined.gain < listed {
-            return None;
+        match self.on_part_of_the_floor(&refined) {
+            Some(area) if area.score() > refined.score() => Some(area),
+            _ => Some(refined),
         }
-        Cause::of(&refined.settings[0]).map(|cause| Unnamed {
-            cause,
-            refined: Some(refined),
-        })
     }
 
     /// A cause that depends on the place as one that acts on a part of the floor, with a soft edge or a sharp one, about a place on the
