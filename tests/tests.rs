@@ -8,6 +8,7 @@ mod controls;
 mod damaged;
 mod declared;
 mod determinism;
+mod effects_in_logs;
 mod errors;
 #[path = "../benches/ground/mod.rs"]
 mod ground;

@@ -128,21 +128,42 @@ pub(crate) fn slow_speeds(commands: impl Iterator<Item = WheelSpeeds>) -> Vec<f6
     sizes
 }
 
+/// An effect at several sizes.
+fn scan(spec: &'static Spec, sizes: impl Iterator<Item = f64>) -> Vec<Variant> {
+    let at = |size: f64| Variant {
+        spec,
+        shape: Shape::Scan,
+        values: vec![size],
+        free: vec![0],
+        sizes: vec![0],
+        steps: vec![size],
+    };
+    sizes.map(at).collect()
+}
+
+/// Roundings of speeds to multiples of 1 to 30 mm/s, so far apart.
+fn speed_steps(spec: &'static Spec, apart_m_s: f64) -> Vec<Variant> {
+    let count = |speed_m_s: f64| (speed_m_s / apart_m_s).round() as usize;
+    scan(spec, (count(0.001)..count(0.03)).map(|i| apart_m_s * i as f64))
+}
+
+/// The sizes of an effect that jumps which are worth a look where it is the matter: a rounding of speeds whose last but one multiple
+/// is the most common speed is nothing like one whose last is.
+pub(crate) fn leaps(spec: &'static Spec, variants: Vec<Variant>) -> Vec<Variant> {
+    /// Narrower than the likelihood's tops.
+    const APART_M_S: f64 = 1e-4;
+    match spec.name {
+        "speed-step" => speed_steps(spec, APART_M_S),
+        _ => (variants.into_iter())
+            .filter(|variant| *variant.spec == *spec)
+            .collect(),
+    }
+}
+
 /// The variants of one effect; none of those that are judged otherwise.
 fn of(spec: &'static Spec, wall_lengths_m: [f64; 2], dead_bands_m_s: &[f64]) -> Vec<Variant> {
     let one = |neutral: f64, step: f64| vec![Variant::linear(spec, &[neutral], &[(0, step)])];
-    let scan = |sizes: &[f64]| -> Vec<Variant> {
-        (sizes.iter())
-            .map(|&size| Variant {
-                spec,
-                shape: Shape::Scan,
-                values: vec![size],
-                free: vec![0],
-                sizes: vec![0],
-                steps: vec![size],
-            })
-            .collect()
-    };
+    let scan = |sizes: &[f64]| scan(spec, sizes.iter().copied());
     let sensors = |neutral: f64, step: f64| {
         (0..8)
             .map(|sensor| Variant::linear(spec, &[f64::from(sensor), neutral], &[(1, step)]))
@@ -170,7 +191,7 @@ fn of(spec: &'static Spec, wall_lengths_m: [f64; 2], dead_bands_m_s: &[f64]) -> 
         "command-delay" => scan(&[0.032, 0.064, 0.096, 0.128, 0.192, 0.256, 0.32, 0.416, 0.512]),
         "dead-band" => scan(dead_bands_m_s),
         "acceleration-limit" => scan(&[0.02, 0.04, 0.08, 0.15, 0.3, 0.6, 1.2, 2.4]),
-        "speed-step" => scan(&(2..60).map(|i| 5e-4 * f64::from(i)).collect::<Vec<_>>()),
+        "speed-step" => speed_steps(spec, 5e-4),
         "floor-tilt" => vec![Variant {
             spec,
             shape: Shape::Polar,

@@ -11,6 +11,7 @@ use super::evidence::{Evidence, widened};
 use super::filter::MEASURED;
 use super::groups::{area_variants, settling_variants, unlisted_variants};
 use super::implausible::{Implausible, take_out_spikes};
+use super::leads::Lead;
 use super::recut::recut;
 use super::refined::Refined;
 use super::rows::{LogRow, LoggedRun, bridged, without_logs};
@@ -93,10 +94,9 @@ pub fn diagnose_logs(
         declared.elsewhere(first.as_ref().map_or(&scene, |found| &found.1)),
         step,
     )?;
-    let corners = |cut: &Option<(Corners, Scene)>| cut.as_ref().map_or(EXACT, |found| found.0);
     watch("each effect by the log");
     let Some(leads) = search.alone() else {
-        return Ok(search.answer(decision, spoilt, corners(&first)));
+        return Ok(search.answer(decision, spoilt, corners_of(&first)));
     };
     // Where walls or the robot then are elsewhere, so are the readings that no edge spoils.
     let clear = search.evidence.clear_with_each(search.rivals());
@@ -108,31 +108,84 @@ pub fn diagnose_logs(
         ));
         search = search.renewed(clear)?;
     }
-    watch(&format!(
-        "where the walls are cut with {}",
-        search.best_in_words()
-    ));
-    // A large effect blurs where the corners are: they are looked for again beside the best candidate, with the size that it has
-    // there and, as corners that are wrong spoil that too, with the one that it has between the declared walls.
-    let uncut = search.evidence.elsewhere(&scene);
-    let sizes = [
-        Some(search.best().to_vec()),
-        first.as_ref().and_then(|_| search.best_by(&uncut)),
-    ];
-    let again = (sizes.into_iter().flatten())
-        .filter_map(|settings| recut(&scene, &wide, &uncut, &settings))
-        .max_by(|a, b| a.log_likelihood.total_cmp(&b.log_likelihood))
-        .and_then(|found| found.cut);
-    watch(&format!("what is beside {}", search.best_in_words()));
-    if was_clear && corners(&again) == corners(&first) {
-        search.finish(&leads);
-        return Ok(search.answer(decision, spoilt, corners(&first)));
+    let logs = Logs {
+        scene: &scene,
+        wide: &wide,
+        declared: &declared,
+        leads: &leads,
+        watch,
+    };
+    logs.between_walls(search, corners_of(&first), was_clear, 0, (decision, spoilt))
+}
+
+/// The logs between the declared walls, and what linear algebra ranks there.
+struct Logs<'l> {
+    scene: &'l Scene,
+    wide: &'l Model,
+    declared: &'l Evidence<'l>,
+    leads: &'l [Lead],
+    watch: &'l Watch<'l>,
+}
+
+impl Logs<'_> {
+    /// The answer of a search between the walls that the logs like best beside its best candidate; `is_clear` if the readings that count
+    /// are those that do beside that. What is missing blurs where the corners are: they are looked for again beside each of the further
+    /// effects, so many of which have been found.
+    fn between_walls(
+        &self,
+        search: Search<'_>,
+        corners: Corners,
+        is_clear: bool,
+        further: usize,
+        rest: (Decision, Spoilt),
+    ) -> Result<LogDiagnosis, Error> {
+        let best = search.best_in_words();
+        (self.watch)(&format!("where the walls are cut with {best}"));
+        let uncut = search.evidence.elsewhere(self.scene);
+        // With the sizes that they have there and, as corners that are wrong spoil these too, with those between the declared walls.
+        let sizes = [
+            Some(search.best().to_vec()),
+            (corners != EXACT).then(|| search.best_by(&uncut)).flatten(),
+        ];
+        let again = (sizes.into_iter().flatten())
+            .filter_map(|settings| recut(self.scene, self.wide, &uncut, &settings))
+            .max_by(|a, b| a.log_likelihood.total_cmp(&b.log_likelihood))
+            .and_then(|found| found.cut);
+        (self.watch)(&format!("what is beside {best}"));
+        let found = corners_of(&again);
+        if is_clear && found == corners {
+            return self.one_more_beside(search, corners, further, rest);
+        }
+        let declared = (self.declared).elsewhere(again.as_ref().map_or(self.scene, |found| &found.1));
+        let clear = declared.clear_with_each(search.rivals());
+        self.one_more_beside(search.renewed(clear.unwrap_or(declared))?, found, further, rest)
     }
-    let declared = declared.elsewhere(again.as_ref().map_or(&scene, |found| &found.1));
-    let clear = declared.clear_with_each(search.rivals());
-    let mut renewed = search.renewed(clear.unwrap_or(declared))?;
-    renewed.finish(&leads);
-    Ok(renewed.answer(decision, spoilt, corners(&again)))
+
+    /// The answer of a search that may find one more effect.
+    fn one_more_beside(
+        &self,
+        mut search: Search<'_>,
+        corners: Corners,
+        further: usize,
+        rest: (Decision, Spoilt),
+    ) -> Result<LogDiagnosis, Error> {
+        /// Further effects at most; between other walls there may be fewer again.
+        const MOST: usize = 2;
+        if further == 0 {
+            search.unnamed = search.unnamed_before_pairs(self.leads);
+        }
+        if further < MOST && search.unnamed.is_none() && search.one_more(self.leads) {
+            return self.between_walls(search, corners, true, further + 1, rest);
+        }
+        search.finish();
+        let (decision, spoilt) = rest;
+        Ok(search.answer(decision, spoilt, corners))
+    }
+}
+
+/// The corners of walls that were cut elsewhere than declared, or the declared ones.
+fn corners_of(cut: &Option<(Corners, Scene)>) -> Corners {
+    cut.as_ref().map_or(EXACT, |found| found.0)
 }
 
 impl Search<'_> {

@@ -8,7 +8,9 @@ use track::Side;
 
 use super::catalogue::{Variant, slow_speeds, variants};
 use super::columns::columns;
-use super::filter::{Trace, Used, clear_readings, filter, leads_elsewhere, likelihood, reaches_elsewhere};
+use super::filter::{
+    MEASURED, Trace, Used, clear_readings, filter, leads_elsewhere, likelihood, reaches_elsewhere,
+};
 use super::rows::{LogRow, stretches};
 use super::screen::{Normal, normal_of};
 use super::steps::WHOLE;
@@ -58,17 +60,19 @@ pub(crate) struct Knob {
     pub(crate) value: usize,
     /// Whether it is the change per second of a pattern by time.
     pub(crate) slope: bool,
+    /// Of a pattern by run, whose value it is.
+    pub(crate) run: Option<usize>,
     pub(crate) step: f64,
 }
 
 impl Knob {
-    /// The value in these settings; a pattern by run has none of its own.
+    /// The value in these settings.
     pub(crate) fn of<'s>(&self, settings: &'s mut [Setting]) -> &'s mut f64 {
         match &mut settings[self.setting].pattern {
             Pattern::Constant(values) => &mut values[self.value],
             Pattern::ByTime { per_s, .. } if self.slope => &mut per_s[self.value],
             Pattern::ByTime { start, .. } => &mut start[self.value],
-            Pattern::ByRun(runs) => &mut runs[0][self.value],
+            Pattern::ByRun(runs) => &mut runs[self.run.unwrap_or(0)][self.value],
         }
     }
 
@@ -78,8 +82,9 @@ impl Knob {
         let value = self.of(&mut turned);
         *value += multiple * self.step;
         let Setting { spec, pattern } = &settings[self.setting];
-        let (Pattern::Constant(values) | Pattern::ByTime { start: values, .. }) = pattern else {
-            return turned;
+        let values = match pattern {
+            Pattern::Constant(values) | Pattern::ByTime { start: values, .. } => values,
+            Pattern::ByRun(runs) => &runs[self.run.unwrap_or(0)],
         };
         if !self.slope {
             *value = bounded(spec, values, self.value, *value);
@@ -303,6 +308,7 @@ impl<'a> Evidence<'a> {
     ) -> Option<Vec<Vec<f32>>> {
         /// A step but for its rounding.
         const WHOLE: f64 = 0.999;
+        let count = knobs.len();
         let turned = |knob: &Knob| {
             let [up, down] = [1.0, -1.0].map(|multiple| {
                 let side = knob.turned(settings, multiple);
@@ -312,7 +318,10 @@ impl<'a> Evidence<'a> {
             let is_cut = up.0.abs() < WHOLE.min(down.0.abs());
             if is_cut { down } else { up }
         };
-        let sides: Vec<(f64, Vec<Setting>)> = knobs.iter().map(turned).collect();
+        let (own, knobs): (Vec<usize>, Vec<&Knob>) = (knobs.iter().enumerate())
+            .filter(|(_, knob)| knob.run.is_none_or(|run| run == world.run()))
+            .unzip();
+        let sides: Vec<(f64, Vec<Setting>)> = knobs.iter().map(|knob| turned(knob)).collect();
         let worlds: Vec<World<'a>> = (sides.iter())
             .map(|(_, side)| self.world(side, world.run()).ok())
             .collect::<Option<_>>()?;
@@ -322,10 +331,12 @@ impl<'a> Evidence<'a> {
                 Some((forecast, stage_of(&settings[knob.setting])))
             })
             .collect::<Option<Vec<_>>>()?;
-        let mut found = columns(others, trace);
-        for (column, (steps, _)) in found.iter_mut().zip(&sides) {
+        // What another run's value changes here: nothing.
+        let mut found = vec![vec![0.0; trace.instants.len() * MEASURED]; count];
+        for ((place, mut column), (steps, _)) in own.into_iter().zip(columns(others, trace)).zip(&sides) {
             let whole = if *steps == 0.0 { 0.0 } else { steps.recip() as f32 };
             column.iter_mut().for_each(|c| *c *= whole);
+            found[place] = column;
         }
         Some(found)
     }
@@ -343,6 +354,7 @@ mod tests {
             setting: 0,
             value,
             slope: false,
+            run: None,
             step,
         };
         let moved = |setting: &Setting, knob: &Knob, multiple: f64| {

@@ -1,7 +1,7 @@
 //! Which variants, in which pattern over runs and time, are worth a refinement.
 
 use nalgebra::{DMatrix, DVector};
-use sim::{Setting, UNLISTED};
+use sim::{Pattern, Setting, UNLISTED};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::catalogue::{Shape, Variant};
@@ -44,6 +44,41 @@ impl Lead {
     pub(crate) fn start(&self, variant: &Variant) -> Setting {
         start(variant, self.multiples[0].as_slice())
     }
+
+    /// Where a refinement in its own pattern begins.
+    pub(crate) fn in_pattern(&self, variant: &Variant, evidence: &Evidence<'_>) -> Setting {
+        in_pattern(variant, self.by, &self.multiples, evidence)
+    }
+}
+
+/// Where a refinement of a variant in a pattern begins, which does not change in time yet: at multiples of its columns, one list, or
+/// one for each run of the evidence.
+pub(super) fn in_pattern(
+    variant: &Variant,
+    by: By,
+    multiples: &[DVector<f64>],
+    evidence: &Evidence<'_>,
+) -> Setting {
+    let values = |multiples: &DVector<f64>| variant.values_at(&multiples.as_slice()[..variant.sizes.len()]);
+    let first = values(&multiples[0]);
+    let pattern = match by {
+        By::Constant => Pattern::Constant(first),
+        By::Time => Pattern::ByTime {
+            per_s: vec![0.0; first.len()],
+            start: first,
+        },
+        By::Run => {
+            let mut all = vec![first; evidence.measured_runs];
+            for (run, multiples) in evidence.runs().into_iter().zip(multiples) {
+                all[run] = values(multiples);
+            }
+            Pattern::ByRun(all)
+        }
+    };
+    Setting {
+        spec: variant.spec,
+        pattern,
+    }
 }
 
 /// Log-likelihood that a candidate must pay for its values and its pattern.
@@ -71,7 +106,7 @@ pub(crate) fn leads(evidence: &Evidence<'_>, variants: &[Variant], normals: &[Ve
     (variants.iter().zip(normals).enumerate())
         .flat_map(|(i, (variant, normals))| {
             let mut leads = vec![constant(i, normals)];
-            if patterns(variant) {
+            if may_change(variant) {
                 leads.push(by_time(i, normals));
                 if runs.len() > 1 {
                     leads.push(by_run(evidence, i, normals, &runs));
@@ -83,7 +118,7 @@ pub(crate) fn leads(evidence: &Evidence<'_>, variants: &[Variant], normals: &[Ve
 }
 
 /// Whether a variant may differ by run or change in time: not where its place or its size is one of a scan.
-fn patterns(variant: &Variant) -> bool {
+pub(super) fn may_change(variant: &Variant) -> bool {
     match variant.shape {
         Shape::Scan => variant.spec.name == "cone-of-view",
         Shape::Along => variant.spec.name == "directional-light",

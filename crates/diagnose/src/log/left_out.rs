@@ -31,8 +31,8 @@ impl Refined {
             for tried in &tried {
                 settings[tried.place] = tried.best_without(run, evidence);
             }
-            if let Some(first) = self.without.get(&run) {
-                settings[..first.len()].clone_from_slice(first);
+            for (&place, own) in self.without.get(&run).into_iter().flatten() {
+                settings[place].clone_from(own);
             }
             settings
         };

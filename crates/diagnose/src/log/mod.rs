@@ -21,6 +21,7 @@ mod moments;
 // Which effects could explain it.
 mod catalogue;
 mod columns;
+mod further;
 mod groups;
 mod leads;
 mod pairs;
@@ -40,7 +41,6 @@ mod diagnosis;
 mod left_out;
 mod repeat;
 mod search;
-mod second;
 
 // What is said beside the answer.
 mod detectable;

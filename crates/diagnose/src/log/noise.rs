@@ -62,19 +62,20 @@ pub(crate) fn by_chance(noise: &[Factor]) -> f64 {
 ///
 /// The filter is linear about its pose, so that a factor scatters more than its likelihood says, and not about 1: in 240 laps of
 /// robots as declared the slip level is found 2 to 4 % low, with a stated error of 0.5 %. A gain that this could make is
-/// compared with those in simulated logs (Student's t); one whose p is `level` or more by the likelihood stays as it is. Readings in
-/// coarse steps are no normal numbers: no gain is beyond their faults.
+/// compared with those in simulated logs (Student's t), and so is one of `faults` or less; one whose p is `level` or more by the
+/// likelihood stays as it is. Readings in coarse steps are no normal numbers: no gain is beyond their faults.
 pub(crate) fn p_among_repeats(
     evidence: &Evidence<'_>,
     settings: &[Setting],
     noise: &[Factor],
     level: f64,
+    faults: f64,
 ) -> f64 {
     /// Log-likelihood that no fault of the filter gains.
     const SURE: f64 = 50.0;
     let of_factor = |factor: &Factor| {
         let p = factor.p();
-        if p >= level || factor.gain > SURE && !evidence.is_coarse() {
+        if p >= level || factor.gain > faults.max(SURE) && !evidence.is_coarse() {
             return p;
         }
         let logs = repeats(evidence, settings, |repeated| {
@@ -121,6 +122,11 @@ impl Factor {
     /// Probability of the gain by chance among all factors, if the likelihood were exact.
     fn p(&self) -> f64 {
         FACTORS * tail(2.0 * self.gain, 1)
+    }
+
+    /// Whether there is less noise than declared, which nothing with a mean makes of it.
+    pub(crate) fn is_quieter(&self) -> bool {
+        self.middle < 0.0
     }
 
     /// The likelihood at a logarithm of the factor.
@@ -211,6 +217,7 @@ impl Factor {
             fitted: 1,
             by: By::Constant,
             without: BTreeMap::new(),
+            faults: f64::INFINITY,
         })
     }
 }
@@ -280,6 +287,7 @@ mod tests {
             fitted: 1,
             by: By::Constant,
             without: BTreeMap::new(),
+            faults: f64::INFINITY,
         };
         let twin = with_memory(&of(2.0)).unwrap();
         let Pattern::Constant(values) = &twin.settings[0].pattern else {

@@ -35,18 +35,26 @@ pub(crate) fn knobs(variant: &Variant, setting: usize, pattern: &Pattern) -> Vec
             _ => 0.02 * variant.values[value].abs().max(1e-3),
         }
     };
-    let flat = variant.free.iter().map(|&value| Knob {
-        setting,
-        value,
-        slope: false,
-        step: step(value),
-    });
+    let of = |run: Option<usize>| {
+        variant.free.iter().map(move |&value| Knob {
+            setting,
+            value,
+            slope: false,
+            run,
+            step: step(value),
+        })
+    };
+    if let Pattern::ByRun(runs) = pattern {
+        return (0..runs.len()).flat_map(|run| of(Some(run))).collect();
+    }
+    let flat = of(None);
     if matches!(pattern, Pattern::ByTime { .. }) {
         // A step that changes as much by the middle of a run of a few minutes.
         let slopes = variant.free.iter().map(|&value| Knob {
             setting,
             value,
             slope: true,
+            run: None,
             step: step(value) / 200.0,
         });
         return flat.chain(slopes).collect();
@@ -54,10 +62,10 @@ pub(crate) fn knobs(variant: &Variant, setting: usize, pattern: &Pattern) -> Vec
     flat.collect()
 }
 
-/// The values of settings that a refinement may change: not those that jump or go by run.
+/// The values of settings that a refinement may change: not those that jump.
 pub(crate) fn knobs_of(settings: &[Setting], variants: &[Variant]) -> Vec<Knob> {
     (settings.iter().enumerate())
-        .filter(|(_, setting)| !jumps(setting) && !matches!(setting.pattern, Pattern::ByRun(_)))
+        .filter(|(_, setting)| !jumps(setting))
         .filter_map(|(i, setting)| Some(knobs(Variant::of(setting, variants)?, i, &setting.pattern)))
         .flatten()
         .collect()
@@ -155,17 +163,18 @@ pub(crate) fn pooled(assessment: &Assessment, count: usize) -> (DMatrix<f64>, DV
     )
 }
 
-/// The best delay: trial delays about the best one so far, in whole physics steps, as all others do what the nearest of these
+/// The best delay beside the other settings: trial delays about the best one so far, in whole physics steps, as all others do what the nearest of these
 /// does.
-pub(crate) fn hunt_delay(evidence: &Evidence<'_>, setting: &Setting) -> Option<Fitted> {
+pub(crate) fn hunt_delay(evidence: &Evidence<'_>, settings: &[Setting], place: usize) -> Option<Fitted> {
     let step_s = evidence.physics_step_s()?;
+    let setting = &settings[place];
     let (Pattern::Constant(values), param) = (&setting.pattern, &setting.spec.params[0]) else {
         return None;
     };
     let mut known: BTreeMap<i64, Option<f64>> = BTreeMap::new();
     let mut at = |steps: i64| -> Option<(i64, f64)> {
         let delay_s = (steps as f64 * step_s).clamp(param.low, param.high);
-        let likelihood = || evidence.likelihood(&[Setting::constant(setting.spec, [delay_s])]);
+        let likelihood = || evidence.likelihood(&resized(settings, place, delay_s));
         known
             .entry(steps)
             .or_insert_with(likelihood)
@@ -181,13 +190,14 @@ pub(crate) fn hunt_delay(evidence: &Evidence<'_>, setting: &Setting) -> Option<F
         }
     }
     let knob = Knob {
-        setting: 0,
+        setting: place,
         value: 0,
         slope: false,
+        run: None,
         step: step_s,
     };
     Some(Fitted {
-        settings: vec![Setting::constant(setting.spec, [best.0 as f64 * step_s])],
+        settings: resized(settings, place, best.0 as f64 * step_s),
         knobs: vec![knob],
         log_likelihood: best.1,
         // Of all that are nearest to it.
@@ -195,8 +205,20 @@ pub(crate) fn hunt_delay(evidence: &Evidence<'_>, setting: &Setting) -> Option<F
     })
 }
 
-/// The best size of an effect that jumps: trial sizes about its own, then ever closer ones until they are about as good.
-pub(crate) fn hunt(evidence: &Evidence<'_>, setting: &Setting, spread: f64) -> Option<Fitted> {
+/// The settings with another size at one place.
+fn resized(settings: &[Setting], place: usize, size: f64) -> Vec<Setting> {
+    let mut resized = settings.to_vec();
+    resized[place] = Setting::constant(settings[place].spec, [size]);
+    resized
+}
+
+/// The best size of an effect that jumps beside the other settings: trial sizes about its own, then ever closer ones until they are about as good.
+pub(crate) fn hunt(
+    evidence: &Evidence<'_>,
+    settings: &[Setting],
+    place: usize,
+    spread: f64,
+) -> Option<Fitted> {
     /// Rounds at most, and log-likelihood that a round must gain, or lose on either side, for another one to follow.
     const MOST: usize = 10;
     const NOTHING: f64 = 0.5;
@@ -204,10 +226,11 @@ pub(crate) fn hunt(evidence: &Evidence<'_>, setting: &Setting, spread: f64) -> O
     /// Rounds at least.
     const LEAST: usize = 4;
     let at = |size: f64| -> Option<(f64, f64)> {
-        let log_likelihood = evidence.likelihood(&[Setting::constant(setting.spec, [size])])?;
+        let log_likelihood = evidence.likelihood(&resized(settings, place, size))?;
         Some((size, log_likelihood))
     };
-    let (Pattern::Constant(values), param) = (&setting.pattern, &setting.spec.params[0]) else {
+    let Setting { spec, pattern } = &settings[place];
+    let (Pattern::Constant(values), param) = (pattern, &spec.params[0]) else {
         return None;
     };
     let mut best = at(values[0])?;
@@ -229,13 +252,14 @@ pub(crate) fn hunt(evidence: &Evidence<'_>, setting: &Setting, spread: f64) -> O
         }
     }
     let knob = Knob {
-        setting: 0,
+        setting: place,
         value: 0,
         slope: false,
+        run: None,
         step: spread,
     };
     Some(Fitted {
-        settings: vec![Setting::constant(setting.spec, [best.0])],
+        settings: resized(settings, place, best.0),
         knobs: vec![knob],
         log_likelihood: best.1,
         standard_errors: vec![spread.max(0.004 * best.0)],

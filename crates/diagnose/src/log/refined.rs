@@ -3,15 +3,17 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use rayon::prelude::*;
-use sim::{Pattern, Setting};
+use sim::{Param, Pattern, Setting, Spec};
 use statrs::statistics::Statistics;
 
-use super::catalogue::Variant;
+use super::catalogue::{Variant, leaps};
 use super::evidence::{Assessment, Evidence, Knob};
 use super::leads::{By, Lead, price, trusted};
 use super::noise::{factor_again, is_noise};
+use super::pairs::Pair;
 use super::refine::{Fitted, hunt, hunt_delay, jumps, knobs, knobs_of, one_step, refine};
 use super::repeat::repeats;
+use super::search::screened;
 use crate::candidate::{OfRun, apart, filled};
 
 /// A candidate with its best values and their pattern.
@@ -23,13 +25,17 @@ pub(crate) struct Refined {
     pub(crate) gain: f64,
     pub(crate) fitted: usize,
     pub(crate) by: By,
-    /// Where the first of its sizes are put together of what each run tells: what they are without that of one.
-    pub(crate) without: BTreeMap<usize, Vec<Setting>>,
+    /// What those effects whose sizes are put together of what each run tells are without that of one, by run and place among the
+    /// settings.
+    pub(crate) without: BTreeMap<usize, BTreeMap<usize, Setting>>,
+    /// Log-likelihood that it may owe to faults of the filter, as simulated logs tell; infinite if they were not asked.
+    pub(crate) faults: f64,
 }
 
 impl Refined {
     pub(crate) fn score(&self) -> f64 {
-        trusted(self.gain, self.fitted, self.by) - price(self.fitted, self.by)
+        let trusted = trusted(self.gain, self.fitted, self.by);
+        trusted.max(self.gain - self.faults) - price(self.fitted, self.by)
     }
 
     /// The effects' names, whatever their order.
@@ -37,7 +43,48 @@ impl Refined {
         self.settings.iter().map(|setting| setting.spec.name).collect()
     }
 
-    /// Refined by further steps from where it is; `base` is the log-likelihood of the declared model.
+    /// Where a refinement of a pair begins.
+    pub(crate) fn of_pair(pair: &Pair) -> Self {
+        let settings: Vec<Setting> = pair.parts.iter().map(|(_, setting)| setting.clone()).collect();
+        Self {
+            standard_errors: settings.iter().map(unfitted).collect(),
+            by: by_all(&settings),
+            settings,
+            gain: pair.gain,
+            fitted: 0,
+            without: BTreeMap::new(),
+            faults: f64::INFINITY,
+        }
+    }
+
+    /// With one effect more, that is not refined.
+    pub(crate) fn with(&self, further: Setting) -> Self {
+        let mut with = self.clone();
+        with.standard_errors.push(unfitted(&further));
+        with.settings.push(further);
+        with.by = by_all(&with.settings);
+        with
+    }
+
+    /// With one effect less, the others as they are.
+    pub(crate) fn less(&self, place: usize) -> Self {
+        let mut less = self.clone();
+        less.settings.remove(place);
+        less.standard_errors.remove(place);
+        less.by = by_all(&less.settings);
+        for without in less.without.values_mut() {
+            let moved = std::mem::take(without)
+                .into_iter()
+                .filter(|(other, _)| *other != place);
+            *without = moved
+                .map(|(other, setting)| (other - usize::from(other > place), setting))
+                .collect();
+        }
+        less
+    }
+
+    /// Refined by further steps from where it is, but for what jumps or is noise; `base` is the log-likelihood of the
+    /// declared model.
     pub(crate) fn further(
         self,
         evidence: &Evidence<'_>,
@@ -47,9 +94,55 @@ impl Refined {
     ) -> Self {
         let knobs = self.knobs(variants);
         match refine(evidence, self.settings.clone(), knobs, steps) {
-            Some(fitted) => refined(fitted, base, self.by),
+            Some(fitted) => refined(fitted, base, self.by).keeping(&self),
             None => self,
         }
+    }
+
+    /// With what `before` knew of those effects that were not refined since.
+    fn keeping(mut self, before: &Self) -> Self {
+        for place in 0..self.settings.len() {
+            let own = &mut self.standard_errors[place];
+            if own.iter().any(|error| *error > 0.0) {
+                continue;
+            }
+            own.clone_from(&before.standard_errors[place]);
+            for (&run, without) in &before.without {
+                if let Some(setting) = without.get(&place) {
+                    self.without
+                        .entry(run)
+                        .or_default()
+                        .insert(place, setting.clone());
+                }
+            }
+        }
+        let is_known = |error: &&f64| **error > 0.0;
+        self.fitted = self.standard_errors.iter().flatten().filter(is_known).count();
+        self
+    }
+
+    /// Takes the sizes that each run tells as those of the effect at this place, which is the next to get errors.
+    fn take(&mut self, place: usize, of_runs: OfRuns) {
+        self.settings[place] = of_runs.setting;
+        self.standard_errors.push(of_runs.errors);
+        for (run, setting) in of_runs.without {
+            self.without.entry(run).or_default().insert(place, setting);
+        }
+    }
+
+    /// With the best sizes of what jumps beside the other effects, and those refined again there.
+    pub(crate) fn hunted(mut self, evidence: &Evidence<'_>, variants: &[Variant], base: f64) -> Self {
+        const STEPS: usize = 2;
+        let places: Vec<usize> = (0..self.settings.len())
+            .filter(|&place| jumps(&self.settings[place]))
+            .collect();
+        for place in places {
+            if let Some(fitted) = leap(evidence, &self.settings, place) {
+                self = refined(fitted, base, self.by).keeping(&self);
+            }
+            self = self.further(evidence, variants, base, STEPS);
+        }
+        self
     }
 
     /// See [`knobs_of`].
@@ -57,8 +150,8 @@ impl Refined {
         knobs_of(&self.settings, variants)
     }
 
-    /// The settings fitted again to other evidence, from where they are; those that jump or go by run stay.
-    fn refit(&self, evidence: &Evidence<'_>, variants: &[Variant]) -> Vec<Setting> {
+    /// The settings fitted again to other evidence, from where they are; those that jump stay.
+    pub(super) fn refit(&self, evidence: &Evidence<'_>, variants: &[Variant]) -> Vec<Setting> {
         let knobs = self.knobs(variants);
         match self.assessed(evidence, &knobs) {
             Some(now) => one_step(evidence, &self.settings, &knobs, &now),
@@ -77,7 +170,10 @@ impl Refined {
     pub(super) fn be_as_unsure_as_far_from(&mut self, other: &Self) {
         let values = self.settings.iter().zip(&other.settings);
         for ((own, other), errors) in values.zip(&mut self.standard_errors) {
-            for (error, (own, other)) in errors.iter_mut().zip(numbers(own).iter().zip(numbers(other))) {
+            for (error, (own, other)) in errors
+                .iter_mut()
+                .zip(own.pattern.numbers().iter().zip(other.pattern.numbers()))
+            {
                 *error = error.max((own - other).abs());
             }
         }
@@ -98,9 +194,9 @@ impl Refined {
             Some(fit)
         });
         for (i, (setting, errors)) in self.settings.iter().zip(&mut self.standard_errors).enumerate() {
-            for (j, (value, error)) in numbers(setting).iter().zip(errors).enumerate() {
-                let param = setting.spec.params.get(j);
-                let square = |fit: &Vec<Setting>| apart(numbers(&fit[i])[j], *value, param).powi(2);
+            for (j, (value, error)) in setting.pattern.numbers().iter().zip(errors).enumerate() {
+                let param = param_of(setting, j);
+                let square = |fit: &Vec<Setting>| apart(fit[i].pattern.numbers()[j], *value, param).powi(2);
                 let mean = fits.iter().map(square).sum::<f64>() / fits.len() as f64;
                 if *error > 0.0 {
                     *error = error.max(mean.sqrt());
@@ -165,41 +261,99 @@ pub(crate) fn pursue(
 }
 
 fn follow(evidence: &Evidence<'_>, variant: &Variant, setting: Setting, steps: usize) -> Option<Fitted> {
-    if setting.spec.name == "command-delay" {
-        return hunt_delay(evidence, &setting);
-    }
     if jumps(&setting) {
-        let spread = match setting.spec.name {
-            "speed-step" => 5e-4,
-            "sensor-reach" => 0.04,
-            _ => 0.003,
-        };
-        return hunt(evidence, &setting, spread);
+        return leap(evidence, &[setting], 0);
     }
     let knobs = knobs(variant, 0, &setting.pattern);
     refine(evidence, vec![setting], knobs, steps)
 }
 
-fn refined(fitted: Fitted, base: f64, by: By) -> Refined {
-    let standard_errors = (fitted.settings.iter().enumerate())
-        .map(|(i, setting)| spread_errors(setting, i, &fitted))
-        .collect();
-    Refined {
-        gain: fitted.log_likelihood - base,
-        fitted: fitted.knobs.len(),
-        settings: fitted.settings,
-        standard_errors,
-        by,
-        without: BTreeMap::new(),
-    }
+/// The best size of an effect that jumps beside others.
+fn leap(evidence: &Evidence<'_>, settings: &[Setting], place: usize) -> Option<Fitted> {
+    let settings = &leapt(evidence, settings, place);
+    let spread = match settings[place].spec.name {
+        "command-delay" => return hunt_delay(evidence, settings, place),
+        "speed-step" => 1e-4,
+        "sensor-reach" => 0.04,
+        _ => 0.003,
+    };
+    hunt(evidence, settings, place, spread)
 }
 
-/// The pattern's values, in the order of their standard errors; none where they go by run.
-fn numbers(setting: &Setting) -> Vec<f64> {
-    match &setting.pattern {
-        Pattern::ByRun(_) => Vec::new(),
-        pattern => pattern.numbers(),
+/// The settings with the best of those sizes of an effect that jumps, and of its own, that linear algebra likes beside the others: its
+/// likelihood has tops far from each other.
+fn leapt(evidence: &Evidence<'_>, settings: &[Setting], place: usize) -> Vec<Setting> {
+    const LIKED: usize = 3;
+    let own = leaps(settings[place].spec, evidence.variants());
+    let mut others = settings.to_vec();
+    others.remove(place);
+    let mut leads = screened(evidence, &others, &own).map_or(Vec::new(), |(_, leads)| leads);
+    leads.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    let liked = leads.iter().take(LIKED).map(|lead| {
+        let mut liked = settings.to_vec();
+        liked[place] = lead.start(&own[lead.variant]);
+        liked
+    });
+    let tried: Vec<Vec<Setting>> = [settings.to_vec()].into_iter().chain(liked).collect();
+    (tried.into_par_iter())
+        .filter_map(|tried| Some((evidence.likelihood(&tried)?, tried)))
+        .max_by(|a, b| a.0.total_cmp(&b.0))
+        .map_or_else(|| settings.to_vec(), |best| best.1)
+}
+
+fn refined(fitted: Fitted, base: f64, by: By) -> Refined {
+    let mut refined = Refined {
+        standard_errors: Vec::new(),
+        gain: fitted.log_likelihood - base,
+        fitted: fitted.knobs.len(),
+        settings: fitted.settings.clone(),
+        by,
+        without: BTreeMap::new(),
+        faults: f64::INFINITY,
+    };
+    for (place, setting) in fitted.settings.iter().enumerate() {
+        let errors = spread_errors(setting, place, &fitted);
+        let of_runs = match &setting.pattern {
+            Pattern::ByRun(runs) if errors.iter().any(|error| *error > 0.0) => {
+                let of_run = errors.chunks(runs[0].len()).map(<[f64]>::to_vec);
+                let told = runs
+                    .iter()
+                    .zip(of_run)
+                    .map(|(values, errors)| told(setting.spec, values.clone(), errors));
+                of_runs(setting.spec, told.collect())
+            }
+            _ => None,
+        };
+        match of_runs {
+            Some(of_runs) => refined.take(place, of_runs),
+            None => refined.standard_errors.push(errors),
+        }
     }
+    refined
+}
+
+/// The parameter that one of the pattern's numbers is of; none of a change per second.
+fn param_of(setting: &Setting, number: usize) -> Option<&'static Param> {
+    let own = match &setting.pattern {
+        Pattern::ByRun(runs) => number % runs[0].len(),
+        Pattern::Constant(_) | Pattern::ByTime { .. } => number,
+    };
+    setting.spec.params.get(own)
+}
+
+/// How the values of several effects go over the runs: as those that go most freely.
+fn by_all(settings: &[Setting]) -> By {
+    let by = |setting: &Setting| match setting.pattern {
+        Pattern::Constant(_) => By::Constant,
+        Pattern::ByTime { .. } => By::Time,
+        Pattern::ByRun(_) => By::Run,
+    };
+    settings.iter().map(by).max().unwrap_or(By::Constant)
+}
+
+/// Standard errors of an effect that was not refined.
+fn unfitted(setting: &Setting) -> Vec<f64> {
+    vec![0.0; setting.pattern.numbers().len()]
 }
 
 /// Standard errors in the order of the pattern's values, 0 where a value was not fitted.
@@ -207,7 +361,7 @@ fn spread_errors(setting: &Setting, number: usize, fitted: &Fitted) -> Vec<f64> 
     let (count, slots) = match &setting.pattern {
         Pattern::ByTime { start, .. } => (start.len(), 2 * start.len()),
         Pattern::Constant(values) => (values.len(), values.len()),
-        Pattern::ByRun(runs) => (runs[0].len(), runs[0].len()),
+        Pattern::ByRun(runs) => (runs[0].len(), runs.len() * runs[0].len()),
     };
     let mut errors = vec![0.0; slots];
     for (knob, error) in fitted
@@ -216,12 +370,13 @@ fn spread_errors(setting: &Setting, number: usize, fitted: &Fitted) -> Vec<f64> 
         .zip(&fitted.standard_errors)
         .filter(|(knob, _)| knob.setting == number)
     {
-        errors[knob.value + if knob.slope { count } else { 0 }] = *error;
+        let row = knob.run.unwrap_or(usize::from(knob.slope));
+        errors[knob.value + row * count] = *error;
     }
     errors
 }
 
-/// One candidate of what was fitted to each run alone, [`filled`] where the log does not tell the size; `None` if no log does.
+/// One candidate of what was fitted to each run alone; `None` if no log tells the size.
 fn by_runs(
     evidence: &Evidence<'_>,
     variant: &Variant,
@@ -229,33 +384,59 @@ fn by_runs(
     parts: &[Fitted],
     base: &[f64],
 ) -> Option<Refined> {
-    let is_place = |i: usize| variant.spec.param(i).is_some_and(|param| param.neutral.is_none());
-    let mut told = vec![None; evidence.measured_runs];
+    let mut all = vec![None; evidence.measured_runs];
     for (&run, part) in runs.iter().zip(parts) {
         let errors = spread_errors(&part.settings[0], 0, part);
-        let values = numbers(&part.settings[0]);
-        let is_told = |(i, error): (usize, &f64)| error.is_finite() || is_place(i);
-        told[run] = (errors.iter().enumerate().all(is_told)).then_some(OfRun { values, errors });
+        all[run] = told(variant.spec, part.settings[0].pattern.numbers(), errors);
     }
+    let of_runs = of_runs(variant.spec, all)?;
+    let mut refined = Refined {
+        settings: vec![of_runs.setting.clone()],
+        standard_errors: Vec::new(),
+        gain: parts.iter().map(|part| part.log_likelihood).sum::<f64>() - base.iter().sum::<f64>(),
+        fitted: parts.iter().map(|part| part.knobs.len()).sum(),
+        by: By::Run,
+        without: BTreeMap::new(),
+        faults: f64::INFINITY,
+    };
+    refined.take(0, of_runs);
+    Some(refined)
+}
+
+/// An effect's sizes run by run.
+struct OfRuns {
+    setting: Setting,
+    /// Run by run in a row.
+    errors: Vec<f64>,
+    /// What they are without what one run tells, by run.
+    without: BTreeMap<usize, Setting>,
+}
+
+/// An effect's sizes of what each run tells, [`filled`] where the log does not; `None` if no log does.
+fn of_runs(spec: &'static Spec, mut told: Vec<Option<OfRun>>) -> Option<OfRuns> {
     give_places(&mut told);
     let (values, errors) = filled(&told)?;
     let of = |values| Setting {
-        spec: variant.spec,
+        spec,
         pattern: Pattern::ByRun(values),
     };
     let without = |run: usize| {
         let mut others = told.clone();
         others[run].take()?;
-        Some((run, vec![of(filled(&others)?.0)]))
+        Some((run, of(filled(&others)?.0)))
     };
-    Some(Refined {
+    Some(OfRuns {
         without: (0..told.len()).filter_map(without).collect(),
-        settings: vec![of(values)],
-        standard_errors: vec![errors],
-        gain: parts.iter().map(|part| part.log_likelihood).sum::<f64>() - base.iter().sum::<f64>(),
-        fitted: parts.iter().map(|part| part.knobs.len()).sum(),
-        by: By::Run,
+        setting: of(values),
+        errors,
     })
+}
+
+/// What a run tells of an effect: its values, if all but places are known.
+fn told(spec: &Spec, values: Vec<f64>, errors: Vec<f64>) -> Option<OfRun> {
+    let is_place = |i: usize| spec.param(i).is_some_and(|param| param.neutral.is_none());
+    let is_told = |(i, error): (usize, &f64)| error.is_finite() || is_place(i);
+    (errors.iter().enumerate().all(is_told)).then_some(OfRun { values, errors })
 }
 
 /// Gives values that a run does not tell, as the place of what does nothing there, the mean of the other runs'; they are not fitted.

@@ -14,7 +14,7 @@ use super::leads::{By, Lead, leads, least_p, most, shortlist};
 use super::noise::{Factor, by_chance, noises, p_among, p_among_repeats, with_memory};
 use super::pairs::Pair;
 use super::refine::jumps;
-use super::refined::{Refined, pursue, together};
+use super::refined::{Refined, pursue};
 use super::repeat::repeats;
 use super::screen::normals;
 use super::unnamed::Unnamed;
@@ -30,7 +30,7 @@ pub(super) const SIGNIFICANT_P: f64 = 1e-3;
 /// Share of the explained log-likelihood that a remainder may have at very high signal.
 pub(super) const MATTERS: f64 = 0.02;
 /// Leads that are refined.
-const PROMISING: usize = 8;
+pub(super) const PROMISING: usize = 8;
 /// Steps of a refinement at most, and those after which what is far behind is left where it is.
 pub(super) const STEPS: usize = 8;
 pub(super) const FIRST_STEPS: usize = 2;
@@ -153,7 +153,7 @@ impl<'a> Search<'a> {
         self.p = by_mean.min(if by_mean < ALARM {
             by_chance(&noise)
         } else {
-            p_among_repeats(&self.evidence, &[], &noise, ALARM)
+            p_among_repeats(&self.evidence, &[], &noise, ALARM, 0.0)
         });
         if self.p >= ALARM {
             return None;
@@ -233,7 +233,7 @@ impl<'a> Search<'a> {
             .collect()
     }
 
-    fn variants_of(&self, leads: &[Lead]) -> Vec<Variant> {
+    pub(super) fn variants_of(&self, leads: &[Lead]) -> Vec<Variant> {
         let variant = |lead: &Lead| self.variants[lead.variant].clone();
         leads.iter().map(variant).collect()
     }
@@ -277,31 +277,16 @@ impl<'a> Search<'a> {
 
     /// A candidate refined again, from where it is, by evidence with this log-likelihood of the declared model.
     fn renew(&self, found: &Refined, evidence: &Evidence<'_>, base: f64) -> Option<Refined> {
-        let variant = Variant::of(&found.settings[0], &self.variants);
-        match (variant, found.by) {
-            (Some(variant), By::Constant) if !jumps(&found.settings[0]) => together(
-                evidence,
-                &[(variant.clone(), found.settings[0].clone())],
-                base,
-                STEPS,
-            ),
-            _ => {
-                let gain = evidence.likelihood(&found.settings)? - base;
-                Some(Refined {
-                    gain,
-                    ..found.clone()
-                })
-            }
-        }
+        let gain = evidence.likelihood(&found.settings)? - base;
+        let again = Refined {
+            gain,
+            ..found.clone()
+        };
+        Some(again.further(evidence, &self.variants, base, STEPS))
     }
 
-    /// Further effects, and whether what is left matters.
-    pub(super) fn finish(&mut self, leads: &[Lead]) {
-        self.unnamed = self.unnamed_before_pairs(leads);
-        if self.unnamed.is_none() {
-            self.second(leads);
-            self.sort();
-        }
+    /// Whether what is left matters, and how well the answer's sizes are known.
+    pub(super) fn finish(&mut self) {
         self.judge();
         self.settle_beside_unnamed();
         if let (Some(best), None, None) = (self.found.first_mut(), self.rounding_counts, &self.unnamed) {
@@ -401,6 +386,6 @@ pub(super) fn screened<'a>(
 }
 
 /// The best score of some variants beside settings.
-fn most_left(evidence: &Evidence<'_>, settings: &[Setting], variants: &[Variant]) -> Option<f64> {
+pub(super) fn most_left(evidence: &Evidence<'_>, settings: &[Setting], variants: &[Variant]) -> Option<f64> {
     screened(evidence, settings, variants).map(|(_, leads)| most(&leads))
 }

@@ -46,13 +46,14 @@ pub(crate) fn out_of_round(evidence: &Evidence<'_>, beside: &[Setting], worth: f
     let without = |nth: usize| {
         let mut others = fits.clone();
         others.remove(nth);
-        (!others.is_empty()).then(|| (runs[nth], of_fits(&others).0))
+        (!others.is_empty()).then(|| (runs[nth], of_fits(&others).0.into_iter().enumerate().collect()))
     };
     let (settings, standard_errors) = of_fits(&fits);
     Some(Refined {
         settings,
         standard_errors,
         without: (0..runs.len()).filter_map(without).collect(),
+        faults: f64::INFINITY,
         gain: fits.iter().map(|fit| fit.gain).sum(),
         fitted: fits.iter().map(|fit| fit.fitted).sum(),
         by: By::Constant,
@@ -106,6 +107,7 @@ mod tests {
             fitted: 2,
             by: By::Constant,
             without: BTreeMap::new(),
+            faults: f64::INFINITY,
         };
         // Amplitudes .05, .05 and .08, the last one known half as well.
         let fits = [
