@@ -2,7 +2,7 @@
 //! places, sensors and sizes at which its column of derivatives is taken. Not here are effects on the controller, whose
 //! commands are recomputed, those on noise, which have no such column, and rounded readings, which show by themselves.
 
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 
 use sim::{EFFECTS, Pattern, Setting, Spec, UNLISTED, WheelSpeeds};
 
@@ -91,6 +91,11 @@ impl Variant {
             Shape::Linear | Shape::Along => {
                 for ((&i, step), multiple) in self.sizes.iter().zip(&self.steps).zip(multiples) {
                     values[i] += step * multiple;
+                }
+                if self.spec.name == "directional-light" && values[0] < 0.0 {
+                    // Less light from here is about as much from the other side.
+                    values[0] = -values[0];
+                    values[1] -= PI.copysign(values[1]);
                 }
             }
         }

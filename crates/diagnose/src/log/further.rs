@@ -162,18 +162,19 @@ impl Search<'_> {
         })
     }
 
-    /// Several effects refined together: a few steps, then to the end the best of every list of names that may still be the best of
-    /// all.
+    /// Several effects refined together, the best of every list of names: a few steps, then to the end those that may still be the best
+    /// of all.
     fn pursued_together(&self, starts: Vec<Refined>) -> Vec<Refined> {
         let steps = |one: Refined, steps| one.further(&self.evidence, &self.variants, self.total(), steps);
         let mut first: Vec<Refined> = (starts.into_par_iter())
             .map(|start| steps(start, FIRST_STEPS))
             .collect();
         first.sort_by(|a, b| b.score().total_cmp(&a.score()));
-        let least = least_in_reach(first.iter());
         let mut names = BTreeSet::new();
+        first.retain(|one| names.insert(one.names()));
+        let least = least_in_reach(first.iter());
         let (hopeful, others): (Vec<Refined>, Vec<Refined>) =
-            (first.into_iter()).partition(|one| names.insert(one.names()) && one.score() >= least);
+            (first.into_iter()).partition(|one| one.score() >= least);
         let refined: Vec<Refined> = (hopeful.into_par_iter())
             .map(|one| steps(one, STEPS - FIRST_STEPS))
             .collect();
