@@ -73,10 +73,10 @@ impl Search<'_> {
 
     /// Log-likelihood that a column must gain beside the best candidate to be more than a fault of the filter, which is linear
     /// about its pose: a share of what that one gains itself, or less, if that is more than is gained so in simulated logs that have
-    /// nothing else.
+    /// nothing else. Readings in coarse steps have likelihoods that linear algebra does not know.
     fn means_beside(&self, best: &Refined, leads: &[Lead], share: f64) -> f64 {
         const TIMES: f64 = 2.0;
-        if most(leads) >= share {
+        if most(leads) >= share || self.evidence.is_coarse() {
             return share;
         }
         let promising = self.variants_of(&shortlist(leads, &self.variants, PROMISING));

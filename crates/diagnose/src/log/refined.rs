@@ -72,6 +72,7 @@ impl Refined {
         less.settings.remove(place);
         less.standard_errors.remove(place);
         less.by = by_all(&less.settings);
+        less.faults = f64::INFINITY;
         for without in less.without.values_mut() {
             let moved = std::mem::take(without)
                 .into_iter()
@@ -118,6 +119,7 @@ impl Refined {
         }
         let is_known = |error: &&f64| **error > 0.0;
         self.fitted = self.standard_errors.iter().flatten().filter(is_known).count();
+        self.faults = before.faults;
         self
     }
 
