@@ -96,8 +96,14 @@ impl Search<'_> {
         if by_chance(&noise) >= SIGNIFICANT_P {
             return Vec::new();
         }
+        // See `means_beside`.
+        let worth = if self.evidence.is_coarse() {
+            faults.max(WORTH)
+        } else {
+            WORTH
+        };
         let largest = (noise.into_iter())
-            .filter(|noise| noise.gain > WORTH && (may_be_louder || noise.is_quieter()))
+            .filter(|noise| noise.gain > worth && (may_be_louder || noise.is_quieter()))
             .max_by(|a, b| a.gain.total_cmp(&b.gain));
         let is_sure = |noise: &Factor| {
             let one = std::slice::from_ref(noise);
@@ -179,14 +185,11 @@ impl Search<'_> {
             .map(|one| steps(one, STEPS - FIRST_STEPS))
             .collect();
         let least = least_in_reach(refined.iter());
-        (refined.into_par_iter())
-            .map(|one| {
-                if one.score() >= least {
-                    one.hunted(&self.evidence, &self.variants, self.total())
-                } else {
-                    one
-                }
-            })
+        let (hopeful, behind): (Vec<Refined>, Vec<Refined>) =
+            (refined.into_iter()).partition(|one| one.score() >= least);
+        (hopeful.into_par_iter())
+            .map(|one| one.hunted(&self.evidence, &self.variants, self.total()))
+            .chain(behind)
             .chain(others)
             .collect()
     }

@@ -100,6 +100,14 @@ impl Refined {
         }
     }
 
+    /// The same values judged by other evidence with this log-likelihood of the declared model; `None` if it cannot drive so.
+    pub(super) fn judged_by(&self, evidence: &Evidence<'_>, base: f64) -> Option<Self> {
+        Some(Self {
+            gain: evidence.likelihood(&self.settings)? - base,
+            ..self.clone()
+        })
+    }
+
     /// With what `before` knew of those effects that were not refined since.
     fn keeping(mut self, before: &Self) -> Self {
         for place in 0..self.settings.len() {

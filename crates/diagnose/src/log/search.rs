@@ -258,31 +258,34 @@ impl<'a> Search<'a> {
             .map(|other| other.settings.as_slice())
     }
 
-    /// The same search with other evidence, its candidates refined again by it.
+    /// The same search with other evidence, its candidates refined again by it; not those far behind several effects.
     pub(super) fn renewed<'b>(self, evidence: Evidence<'b>) -> Result<Search<'b>, Error> {
         let mut renewed = Search::new(evidence, self.rounding_counts)?;
-        (renewed.p, renewed.detectable) = (self.p, self.detectable);
-        renewed.found = (self.found.iter())
-            .filter_map(|found| renewed.renew(found, &renewed.evidence, renewed.total()))
-            .collect();
+        let least = if self.best().len() > 1 {
+            least_in_reach(self.found.iter())
+        } else {
+            f64::NEG_INFINITY
+        };
+        let base = renewed.total();
+        let again = |found: &Refined| {
+            let again = found.judged_by(&renewed.evidence, base)?;
+            Some(if found.score() < least {
+                again
+            } else {
+                again.further(&renewed.evidence, &renewed.variants, base, STEPS)
+            })
+        };
+        let found = self.found.iter().filter_map(again).collect();
+        (renewed.p, renewed.detectable, renewed.found) = (self.p, self.detectable, found);
         renewed.sort();
         Ok(renewed)
     }
 
     /// The effects of the best candidate refined again by other evidence.
     pub(super) fn best_by(&self, evidence: &Evidence<'_>) -> Option<Vec<Setting>> {
-        let renewed = self.renew(self.found.first()?, evidence, evidence.likelihood(&[])?)?;
-        Some(renewed.settings)
-    }
-
-    /// A candidate refined again, from where it is, by evidence with this log-likelihood of the declared model.
-    fn renew(&self, found: &Refined, evidence: &Evidence<'_>, base: f64) -> Option<Refined> {
-        let gain = evidence.likelihood(&found.settings)? - base;
-        let again = Refined {
-            gain,
-            ..found.clone()
-        };
-        Some(again.further(evidence, &self.variants, base, STEPS))
+        let base = evidence.likelihood(&[])?;
+        let again = self.found.first()?.judged_by(evidence, base)?;
+        Some(again.further(evidence, &self.variants, base, STEPS).settings)
     }
 
     /// Whether what is left matters, and how well the answer's sizes are known.
