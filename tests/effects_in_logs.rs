@@ -3,8 +3,7 @@
 use serde_json::Value;
 use sim::{Pattern, Setting, find};
 
-use crate::support::Scratch;
-use crate::tracing::{Robot, holds, says, trace};
+use crate::tracing::{Robot, explained_in_logs, holds};
 
 fn effect(name: &str, values: &[f64]) -> Setting {
     Setting::constant(find(name).unwrap(), values)
@@ -12,16 +11,12 @@ fn effect(name: &str, values: &[f64]) -> Setting {
 
 /// The answer to the logs of a reactive robot with these effects, which has to be these and nothing else.
 fn named(effects: Vec<Setting>, expected: &[&str]) -> Value {
-    let scratch = Scratch::new();
     let first = effects[0].clone();
     let robot = Robot {
         effects,
         ..Robot::with(first).logged(&[3; 3])
     };
-    robot.record(&scratch, "set");
-    let found = trace(&scratch, robot.controller_name(), "set", &[]);
-    says(&found, "explained", expected);
-    found
+    explained_in_logs(&robot, expected)
 }
 
 #[test]

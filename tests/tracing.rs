@@ -188,6 +188,15 @@ pub(crate) fn says(trace: &Value, verdict: &str, expected: &[&str]) {
     );
 }
 
+/// The answer to the logs of a robot, which has to be these effects and nothing else.
+pub(crate) fn explained_in_logs(robot: &Robot, expected: &[&str]) -> Value {
+    let scratch = Scratch::new();
+    robot.record(&scratch, "set");
+    let found = trace(&scratch, robot.controller_name(), "set", &[]);
+    says(&found, "explained", expected);
+    found
+}
+
 /// A parameter's interval, widened to twice its width and by a hundredth of the effect, holds the truth.
 pub(crate) fn holds(effect: &Value, parameter: &str, truth: f64, neutral: f64) {
     let all = effect["parameters"].as_array().unwrap();

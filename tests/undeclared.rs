@@ -8,7 +8,8 @@ use sim::{
 use crate::ground;
 use crate::support::Scratch;
 use crate::tracing::{
-    GAINS, Robot, holds, names, never_a_listed_name, says, share_signatures, trace, without_name,
+    GAINS, Robot, explained_in_logs, holds, names, never_a_listed_name, says, share_signatures, trace,
+    without_name,
 };
 
 /// A listed effect, written anew under another name.
@@ -444,15 +445,10 @@ fn a_listed_effect_under_another_name_is_named_from_logs() {
 
 /// The answer to logs of a robot with one listed effect, which has to be that effect alone.
 fn alone_in_logs(controller: Controller, laps: &[usize], name: &'static str, values: &[f64]) -> Value {
-    let scratch = Scratch::new();
     let effect = Setting::constant(sim::find(name).unwrap(), values);
     let mut robot = Robot::with(effect);
     robot.controller = controller;
-    let robot = robot.logged(laps);
-    robot.record(&scratch, "set");
-    let mut found = trace(&scratch, robot.controller_name(), "set", &[]);
-    says(&found, "explained", &[name]);
-    found["effects"][0].take()
+    explained_in_logs(&robot.logged(laps), &[name])["effects"][0].take()
 }
 
 #[test]

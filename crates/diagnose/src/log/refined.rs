@@ -43,36 +43,37 @@ impl Refined {
         self.settings.iter().map(|setting| setting.spec.name).collect()
     }
 
-    /// Where a refinement of a pair begins.
+    /// Where a refinement of a pair begins; it gains nothing until it is judged by the logs.
     pub(crate) fn of_pair(pair: &Pair) -> Self {
         let settings: Vec<Setting> = pair.parts.iter().map(|(_, setting)| setting.clone()).collect();
         Self {
             standard_errors: settings.iter().map(unfitted).collect(),
             by: by_all(&settings),
             settings,
-            gain: pair.gain,
+            gain: 0.0,
             fitted: 0,
             without: BTreeMap::new(),
             faults: f64::INFINITY,
         }
     }
 
-    /// With one effect more, that is not refined.
+    /// With one effect more, which is not refined; it gains nothing until it is judged by the logs.
     pub(crate) fn with(&self, further: Setting) -> Self {
         let mut with = self.clone();
         with.standard_errors.push(unfitted(&further));
         with.settings.push(further);
         with.by = by_all(&with.settings);
+        with.gain = 0.0;
         with
     }
 
-    /// With one effect less, the others as they are.
+    /// With one effect less, the others as they are; it gains nothing until it is judged by the logs.
     pub(crate) fn less(&self, place: usize) -> Self {
         let mut less = self.clone();
         less.settings.remove(place);
         less.standard_errors.remove(place);
         less.by = by_all(&less.settings);
-        less.faults = f64::INFINITY;
+        (less.gain, less.faults) = (0.0, f64::INFINITY);
         for without in less.without.values_mut() {
             let moved = std::mem::take(without)
                 .into_iter()
