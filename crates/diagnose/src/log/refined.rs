@@ -94,11 +94,19 @@ impl Refined {
         base: f64,
         steps: usize,
     ) -> Self {
-        let knobs = self.knobs(variants);
-        match refine(evidence, self.settings.clone(), knobs, steps) {
-            Some(fitted) => refined(fitted, base, self.by).keeping(&self),
-            None => self,
-        }
+        self.again(evidence, variants, base, steps).unwrap_or(self)
+    }
+
+    /// The same; `None` if the filter loses the robot with it.
+    pub(super) fn again(
+        &self,
+        evidence: &Evidence<'_>,
+        variants: &[Variant],
+        base: f64,
+        steps: usize,
+    ) -> Option<Self> {
+        let fitted = refine(evidence, self.settings.clone(), self.knobs(variants), steps)?;
+        Some(refined(fitted, base, self.by).keeping(self))
     }
 
     /// The same values judged by other evidence with this log-likelihood of the declared model; `None` if it cannot drive so.

@@ -268,12 +268,11 @@ impl<'a> Search<'a> {
         };
         let base = renewed.total();
         let again = |found: &Refined| {
-            let again = found.judged_by(&renewed.evidence, base)?;
-            Some(if found.score() < least {
-                again
+            if found.score() < least {
+                found.judged_by(&renewed.evidence, base)
             } else {
-                again.further(&renewed.evidence, &renewed.variants, base, STEPS)
-            })
+                found.again(&renewed.evidence, &renewed.variants, base, STEPS)
+            }
         };
         let found = self.found.iter().filter_map(again).collect();
         (renewed.p, renewed.detectable, renewed.found) = (self.p, self.detectable, found);
@@ -284,8 +283,8 @@ impl<'a> Search<'a> {
     /// The effects of the best candidate refined again by other evidence.
     pub(super) fn best_by(&self, evidence: &Evidence<'_>) -> Option<Vec<Setting>> {
         let base = evidence.likelihood(&[])?;
-        let again = self.found.first()?.judged_by(evidence, base)?;
-        Some(again.further(evidence, &self.variants, base, STEPS).settings)
+        let again = self.found.first()?.again(evidence, &self.variants, base, STEPS)?;
+        Some(again.settings)
     }
 
     /// Whether what is left matters, and how well the answer's sizes are known.
