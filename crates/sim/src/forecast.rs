@@ -7,7 +7,7 @@ use track::Vec2;
 use crate::apparatus::Apparatus;
 use crate::cast::LANES;
 use crate::effects::{Chain, Hook, Moment};
-use crate::outlook::{Look, Outlook};
+use crate::outlook::{Look, Outlook, Places};
 use crate::world::World;
 use crate::{Error, Machine, Pose, ReadingNoise, Readings, Setting, WheelSpeeds};
 
@@ -183,12 +183,28 @@ impl<'w> Forecast<'w> {
         self.apparatus.distances_m(pose)
     }
 
-    /// Expected readings where the same world without further effects had this look: rays are cast again only where
-    /// the further effects turn them.
-    pub fn readings_beside(&mut self, pose: Pose, covariance: &PoseMatrix, look: &Look) -> Readings {
+    /// What the rays of a look of the same world without further effects met; `None` where they change nothing there.
+    pub fn places(&self, look: &Look) -> Option<Places> {
+        (self.beside == Beside::Places).then(|| self.apparatus.places_of(look))
+    }
+
+    /// Expected readings where the same world without further effects had this look, whose [`Forecast::places`] are those of any
+    /// forecast that has them: rays are cast again only where the further effects turn them.
+    pub fn readings_beside(
+        &mut self,
+        pose: Pose,
+        covariance: &PoseMatrix,
+        look: &Look,
+        places: Option<&Places>,
+    ) -> Readings {
         let mut readings = match self.beside {
             Beside::Nothing => look.response(),
-            Beside::Places => self.apparatus.responses_where_met(look),
+            Beside::Places => match places {
+                Some(places) => self.apparatus.responses_where_met(look, places),
+                None => self
+                    .apparatus
+                    .responses_where_met(look, &self.apparatus.places_of(look)),
+            },
             Beside::Responses => self.apparatus.responses_again(look),
             Beside::Rays | Beside::PlacesOnRays => self.apparatus.outlook(pose, covariance).mean,
         };

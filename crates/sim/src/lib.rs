@@ -37,7 +37,7 @@ pub use error::Error;
 pub use forecast::{Forecast, Motion, PoseMatrix};
 pub use model::{Machine, Model, RunRules, WallRules};
 pub use noise::{Stream, Streams};
-pub use outlook::{Look, Outlook};
+pub use outlook::{Look, Outlook, Places};
 pub use robot::{Pose, Robot, Twist, WheelSpeeds};
 pub use run::{Drive, Run, Start, Step, drive, drive_from};
 pub use sensor::{Beam, Combine, Mount, ReadingNoise, Readings, Response};

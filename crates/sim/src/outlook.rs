@@ -2,6 +2,7 @@
 
 use crate::apparatus::Apparatus;
 use crate::cast::{Hits, LANES, Rays};
+use crate::effects::Hit;
 use crate::forecast::PoseMatrix;
 use crate::{Combine, Pose, Readings, Response};
 
@@ -33,6 +34,10 @@ pub struct Look {
     response: Readings,
 }
 
+/// Where the rays of a look met walls: what all forecasts of one world that see this look need of it.
+#[derive(Debug)]
+pub struct Places([Option<(Hit, f64)>; LANES]);
+
 /// One ray of one sensor: its distance, how that changes with the pose, its standard deviation, and what effects make
 /// of its response.
 #[derive(Clone, Copy)]
@@ -45,10 +50,22 @@ struct Glance {
 }
 
 /// Distances along eight rays, m, and what effects make of their responses.
-#[derive(PartialEq)]
 struct Met {
     distance_m: [f64; LANES],
     factor: [f64; LANES],
+}
+
+impl Met {
+    /// Whether no reading tells them apart: what is far along a wall has tails that never end.
+    fn is_as_good_as(&self, other: &Self) -> bool {
+        const NOTHING_M: f64 = 1e-9;
+        const NOTHING: f64 = 1e-8;
+        let alike = |a: &[f64; LANES], b: &[f64; LANES], nothing: f64| {
+            // Two that are infinite are equal, and no number apart.
+            a.iter().zip(b).all(|(a, b)| a == b || (a - b).abs() < nothing)
+        };
+        alike(&self.distance_m, &other.distance_m, NOTHING_M) && alike(&self.factor, &other.factor, NOTHING)
+    }
 }
 
 /// A response at a distance, its derivative (counts/m) and its second derivative (counts/m^2).
@@ -113,13 +130,13 @@ impl Apparatus<'_> {
     }
 
     /// The same responses from the look that the rays along the axes had before in a world whose sensors respond alike.
-    pub(crate) fn responses_where_met(&self, look: &Look) -> Readings {
-        let met = self.met(&look.rays, &look.hits);
+    pub(crate) fn responses_where_met(&self, look: &Look, places: &Places) -> Readings {
+        let met = self.met_at(&look.hits, places);
         let before = Met {
             distance_m: look.hits.distance_m,
             factor: look.factor,
         };
-        if met == before {
+        if met.is_as_good_as(&before) {
             look.response
         } else if self.sights.len() == 1 {
             self.responses_to(&met, look)
@@ -152,28 +169,45 @@ impl Apparatus<'_> {
     /// What the rays met after what displaces the walls to first order.
     #[inline]
     fn met(&self, rays: &Rays, hits: &Hits) -> Met {
+        if self.weighs_rays || !self.displacing.is_empty() {
+            return self.met_at(hits, &self.places(rays, hits));
+        }
+        Met {
+            distance_m: hits.distance_m,
+            factor: [1.0; LANES],
+        }
+    }
+
+    /// The same where it is known what the rays met.
+    fn met_at(&self, hits: &Hits, places: &Places) -> Met {
         let mut met = Met {
             distance_m: hits.distance_m,
             factor: [1.0; LANES],
         };
-        if self.weighs_rays || !self.displacing.is_empty() {
-            for lane in (0..LANES).filter(|&lane| hits.distance_m[lane].is_finite()) {
-                (met.distance_m[lane], met.factor[lane]) = self.met_by(rays, hits, lane);
+        for (lane, place) in places.0.iter().enumerate() {
+            let Some((hit, towards)) = place else { continue };
+            let moved_m: f64 = (self.displacing.iter())
+                .map(|active| active.effect.displacement_m(&active.values, &hit.site))
+                .sum();
+            met.distance_m[lane] += moved_m / not_grazing(*towards);
+            if self.weighs_rays {
+                met.factor[lane] = self.effects.ray_factor(hit);
             }
         }
         met
     }
 
-    /// Distance along one ray and what effects make of its response.
-    fn met_by(&self, rays: &Rays, hits: &Hits, lane: usize) -> (f64, f64) {
-        let (hit, towards) = self.hit(rays, hits, lane);
-        let moved_m: f64 = (self.displacing.iter())
-            .map(|active| active.effect.displacement_m(&active.values, &hit.site))
-            .sum();
-        (
-            hit.distance_m + moved_m / not_grazing(towards),
-            self.effects.ray_factor(&hit),
-        )
+    fn places(&self, rays: &Rays, hits: &Hits) -> Places {
+        Places(std::array::from_fn(|lane| {
+            hits.distance_m[lane]
+                .is_finite()
+                .then(|| self.hit(rays, hits, lane))
+        }))
+    }
+
+    /// What the rays of a look met, among walls that are this one's.
+    pub(crate) fn places_of(&self, look: &Look) -> Places {
+        self.places(&look.rays, &look.hits)
     }
 
     /// Adds one ray's share: of the reading, or of the shortfall from the range where a sensor averages distances.

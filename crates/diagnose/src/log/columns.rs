@@ -1,77 +1,159 @@
-//! How a small change of the model shows in the whitened innovations.
+//! How small changes of the model show in the whitened innovations.
 
-use sim::{Error, Forecast, Setting, Stage, World};
+use sim::{Error, Forecast, Places, Setting, Stage, World};
 
 use super::filter::{Instant, MEASURED, Trace, difference};
 use super::moments::cut;
+use super::normal::{Normal, Products, Sums};
 use crate::candidate::stage_of;
 
-/// Another model than that of a trace, which differs from it in one stage, and what it does to the innovations.
-struct Other<'w> {
-    forecast: Forecast<'w>,
-    stage: Stage,
-    /// By how much its pose is off there, m and rad.
-    off: [f64; 3],
-    change: Vec<f32>,
-}
+/// Models that are followed side by side.
+pub(super) const ABREAST: usize = 8;
 
-/// The change of each whitened innovation (steps x 10, 0 where it does not count) between the model of the trace and
-/// others that differ from it in one stage each, to first order: the other models are asked at the poses of the trace.
+/// A number of each of them.
+pub(super) type Numbers = [f64; ABREAST];
+
+/// Their changes of each whitened innovation of a control step, 0 where it does not count.
+pub(super) type Changes = [Numbers; MEASURED];
+
+pub(super) const NO_CHANGES: Changes = [[0.0; ABREAST]; MEASURED];
+
+/// Another model than that of a trace, which differs from it in one stage.
+pub(super) type Other<'w> = (Forecast<'w>, Stage);
+
+/// The normal equations of a column for each of the other models of a lot, lot by lot: of the change of each whitened innovation between
+/// the model of the trace and these, to first order. The other models are asked at the poses of the trace.
 ///
-/// A trace is long: it is gone through once for all of them.
-pub(crate) fn columns(others: Vec<(Forecast<'_>, Stage)>, trace: &Trace) -> Vec<Vec<f32>> {
-    let length = trace.instants.len() * MEASURED;
-    let mut others: Vec<Other<'_>> = (others.into_iter())
-        .map(|(forecast, stage)| Other {
-            forecast,
-            stage,
-            off: [0.0; 3],
-            change: vec![0.0; length],
+/// A trace is long: it is gone through once for all lots.
+pub(super) fn normals(lots: Vec<(Vec<Other<'_>>, Products)>, trace: &Trace) -> Vec<Normal> {
+    let mut lots: Vec<(Vec<Others<'_>>, Sums)> = (lots.into_iter())
+        .map(|(lot, wanted)| {
+            let sums = Sums::new(lot.len(), wanted);
+            (abreast(lot), sums)
         })
         .collect();
-    for (step, instant) in trace.instants.iter().enumerate() {
-        for other in &mut others {
-            other.step(step, instant, trace.step_counts);
+    for instant in &trace.instants {
+        for (others, sums) in &mut lots {
+            others
+                .iter_mut()
+                .for_each(|others| others.step(instant, trace.step_counts));
+            sums.add(instant, others.iter().map(|others| &others.changes));
         }
     }
-    others.into_iter().map(|other| other.change).collect()
+    lots.into_iter().map(|(_, sums)| sums.into()).collect()
 }
 
-/// The columns of settings that are added, each alone, to the model of the trace.
+/// The normal equations of the columns of other models, all with each other.
+pub(super) fn normal(others: Vec<Other<'_>>, trace: &Trace) -> Normal {
+    normals(vec![(others, Products::All)], trace).swap_remove(0)
+}
+
+/// Those models of settings that are added, each alone, to the model of a trace.
 ///
 /// # Errors
 /// A setting out of range.
-pub(crate) fn columns_of<'s>(
-    settings: impl Iterator<Item = &'s Setting>,
-    world: &World<'_>,
-    trace: &Trace,
-) -> Result<Vec<Vec<f32>>, Error> {
-    let others = settings.map(|setting| {
-        let forecast = Forecast::beside(world, std::slice::from_ref(setting))?;
-        Ok((forecast, stage_of(setting)))
-    });
-    Ok(columns(others.collect::<Result<_, Error>>()?, trace))
+pub(super) fn each_beside<'w>(
+    settings: impl IntoIterator<Item = Setting>,
+    world: &'w World<'w>,
+) -> Result<Vec<Other<'w>>, Error> {
+    let other = |setting: Setting| {
+        let forecast = Forecast::beside(world, std::slice::from_ref(&setting))?;
+        Ok((forecast, stage_of(&setting)))
+    };
+    settings.into_iter().map(other).collect()
 }
 
-impl Other<'_> {
-    fn step(&mut self, step: usize, instant: &Instant, step_counts: f64) {
+/// Some of the models of a lot, and what they do to the innovations.
+struct Others<'w> {
+    models: Vec<Other<'w>>,
+    /// By how much the pose of each is off there, m and rad.
+    off: [Numbers; 3],
+    changes: Changes,
+}
+
+fn abreast(mut lot: Vec<Other<'_>>) -> Vec<Others<'_>> {
+    let mut all = Vec::new();
+    while !lot.is_empty() {
+        let rest = lot.split_off(lot.len().min(ABREAST));
+        all.push(Others {
+            models: std::mem::replace(&mut lot, rest),
+            off: [[0.0; ABREAST]; 3],
+            changes: NO_CHANGES,
+        });
+    }
+    all
+}
+
+impl Others<'_> {
+    fn step(&mut self, instant: &Instant, step_counts: f64) {
         /// Difference of a pose, m and rad, that shows in nothing.
         const NOTHING: f64 = 1e-9;
-        let Self {
-            forecast,
-            stage,
-            off,
-            change,
-        } = self;
-        let change = &mut change[step * MEASURED..(step + 1) * MEASURED];
-        forecast.tick(instant.time_s);
-        let mut shift = [0.0; MEASURED];
-        if *stage == Stage::Observe {
+        let mut shift = NO_CHANGES;
+        let places = (self.models.iter()).find_map(|(forecast, _)| forecast.places(&instant.look));
+        for (k, (forecast, stage)) in self.models.iter_mut().enumerate() {
+            forecast.tick(instant.time_s);
+            let own = shifted(forecast, *stage, (instant, places.as_ref()), step_counts);
+            if own != [0.0; MEASURED] {
+                (0..MEASURED).for_each(|m| shift[m][k] = own[m]);
+            } else if self.off.iter().all(|off| off[k].abs() < NOTHING) {
+                self.off.iter_mut().for_each(|off| off[k] = 0.0);
+            }
+        }
+        if shift == NO_CHANGES && self.off == [[0.0; ABREAST]; 3] {
+            self.changes = shift;
+        } else {
+            self.follow(instant, &shift);
+        }
+        for (k, (forecast, stage)) in self.models.iter_mut().enumerate() {
+            if *stage == Stage::Act {
+                let moved = difference(
+                    forecast.lead(instant.moved_from, instant.command),
+                    instant.moved_to,
+                );
+                (0..3).for_each(|axis| self.off[axis][k] += moved[axis]);
+            }
+        }
+    }
+
+    /// What becomes of the innovations, and of the poses, where the models expect numbers that differ by `shift` from the trace's.
+    fn follow(&mut self, instant: &Instant, shift: &Changes) {
+        let mut off = self.off;
+        for m in 0..MEASURED {
+            let (slope, gain) = (&instant.slope[m], &instant.gain[m]);
+            let missed: Numbers = std::array::from_fn(|k| {
+                -(shift[m][k] + slope[0] * off[0][k] + slope[1] * off[1][k] + slope[2] * off[2][k])
+            });
+            for axis in 0..3 {
+                (0..ABREAST).for_each(|k| off[axis][k] += gain[axis] * missed[k]);
+            }
+            let counts = instant.used >> m & 1 == 1;
+            let scale = if counts { instant.per_scale[m] } else { 0.0 };
+            self.changes[m] = missed.map(|missed| missed * scale);
+        }
+        for k in 0..ABREAST {
+            off[0][k] -= instant.turned.y * off[2][k];
+            off[1][k] += instant.turned.x * off[2][k];
+        }
+        self.off = off;
+    }
+}
+
+/// By how much another model that differs from that of a trace in one stage expects other numbers at the pose of an instant.
+fn shifted(
+    forecast: &mut Forecast<'_>,
+    stage: Stage,
+    (instant, places): (&Instant, Option<&Places>),
+    step_counts: f64,
+) -> [f64; MEASURED] {
+    let mut shift = [0.0; MEASURED];
+    match stage {
+        Stage::Observe => {
             let seen = forecast.observed(instant.seen_from) - instant.seen;
             (shift[0], shift[1]) = (seen.x, seen.y);
         }
-        if matches!(stage, Stage::Sense | Stage::World) {
-            let read = forecast.readings_beside(instant.sensed_from, &instant.covariance, &instant.look);
+        Stage::Sense | Stage::World => {
+            let read =
+                forecast.readings_beside(instant.sensed_from, &instant.covariance, &instant.look, places);
             for lane in (0..8).filter(|&lane| read[lane] != instant.uncut[lane]) {
                 shift[lane + 2] = cut(
                     read[lane] + instant.remembered[lane],
@@ -83,32 +165,7 @@ impl Other<'_> {
                     - instant.expected[lane];
             }
         }
-        if shift == [0.0; MEASURED] && off.iter().all(|d| d.abs() < NOTHING) {
-            *off = [0.0; 3];
-        } else {
-            for m in 0..MEASURED {
-                let slope = &instant.slope[m];
-                let missed = -(shift[m] + slope[0] * off[0] + slope[1] * off[1] + slope[2] * off[2]);
-                let gain = &instant.gain[m];
-                for axis in 0..3 {
-                    off[axis] += gain[axis] * missed;
-                }
-                if instant.used >> m & 1 == 1 {
-                    change[m] = (missed * instant.per_scale[m]) as f32;
-                }
-            }
-            *off = [
-                off[0] - instant.turned.y * off[2],
-                off[1] + instant.turned.x * off[2],
-                off[2],
-            ];
-        }
-        if *stage == Stage::Act {
-            let moved = difference(
-                forecast.lead(instant.moved_from, instant.command),
-                instant.moved_to,
-            );
-            (0..3).for_each(|axis| off[axis] += moved[axis]);
-        }
+        Stage::Decide | Stage::Act => {}
     }
+    shift
 }

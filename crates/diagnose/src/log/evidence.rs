@@ -7,12 +7,10 @@ use sim::{Forecast, Model, Pattern, Scene, Setting, World};
 use track::Side;
 
 use super::catalogue::{Variant, slow_speeds, variants};
-use super::columns::columns;
-use super::filter::{
-    MEASURED, Trace, Used, clear_readings, filter, leads_elsewhere, likelihood, reaches_elsewhere,
-};
+use super::columns::normal;
+use super::filter::{Trace, Used, clear_readings, filter, leads_elsewhere, likelihood, reaches_elsewhere};
+use super::normal::Normal;
 use super::rows::{LogRow, stretches};
-use super::screen::{Normal, normal_of};
 use super::steps::WHOLE;
 use crate::Error;
 use crate::candidate::{apart, bounded, stage_of};
@@ -287,8 +285,8 @@ impl<'a> Evidence<'a> {
             .par_iter()
             .map(|stretch| {
                 let (world, trace) = self.trace(stretch, settings)?;
-                let columns = self.derivatives(&world, &trace, settings, knobs)?;
-                Some((trace.log_likelihood, normal_of(&trace, &columns)))
+                let normal = self.derivatives(&world, &trace, settings, knobs)?;
+                Some((trace.log_likelihood, normal))
             })
             .collect();
         let (log_likelihood, normals) = parts?.into_iter().unzip();
@@ -298,14 +296,14 @@ impl<'a> Evidence<'a> {
         })
     }
 
-    /// Change of the whitened innovations for one step of each knob, from the side with more of its range.
+    /// The normal equations of the changes of the whitened innovations for one step of each knob, from the side with more of its range.
     fn derivatives(
         &self,
         world: &World<'a>,
         trace: &Trace,
         settings: &[Setting],
         knobs: &[Knob],
-    ) -> Option<Vec<Vec<f32>>> {
+    ) -> Option<Normal> {
         /// A step but for its rounding.
         const WHOLE: f64 = 0.999;
         let count = knobs.len();
@@ -331,14 +329,12 @@ impl<'a> Evidence<'a> {
                 Some((forecast, stage_of(&settings[knob.setting])))
             })
             .collect::<Option<Vec<_>>>()?;
+        let whole = |steps: f64| if steps == 0.0 { 0.0 } else { steps.recip() };
+        let places: Vec<(usize, f64)> = (own.into_iter().zip(&sides))
+            .map(|(place, (steps, _))| (place, whole(*steps)))
+            .collect();
         // What another run's value changes here: nothing.
-        let mut found = vec![vec![0.0; trace.instants.len() * MEASURED]; count];
-        for ((place, mut column), (steps, _)) in own.into_iter().zip(columns(others, trace)).zip(&sides) {
-            let whole = if *steps == 0.0 { 0.0 } else { steps.recip() as f32 };
-            column.iter_mut().for_each(|c| *c *= whole);
-            found[place] = column;
-        }
-        Some(found)
+        Some(normal(others, trace).among(count, &places))
     }
 }
 

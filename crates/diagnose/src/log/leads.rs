@@ -6,7 +6,8 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::catalogue::{Shape, Variant};
 use super::evidence::Evidence;
-use super::screen::{Normal, solve};
+use super::normal::Normal;
+use super::screen::solve;
 
 /// How an effect's values go over the runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]

@@ -24,6 +24,7 @@ mod columns;
 mod further;
 mod groups;
 mod leads;
+mod normal;
 mod pairs;
 mod screen;
 mod unnamed;

@@ -7,11 +7,12 @@ use rayon::prelude::*;
 use sim::{Error, Setting, World};
 
 use super::catalogue::Variant;
-use super::columns::columns_of;
+use super::columns::{each_beside, normal};
 use super::evidence::Evidence;
 use super::filter::Trace;
 use super::leads::{By, in_pattern, may_change, price, trusted};
-use super::screen::{Normal, TOGETHER, normal_of, solve};
+use super::normal::Normal;
+use super::screen::{ranges, solve};
 
 /// Two variants with the settings that linear algebra gives them and the log-likelihood they gain.
 #[derive(Debug, Clone)]
@@ -95,23 +96,15 @@ impl Gram {
         of: &[usize],
     ) -> Result<Self, Error> {
         let settings: Vec<Vec<Setting>> = of.iter().map(|&i| variants[i].settings()).collect();
-        let mut ranges = Vec::new();
-        let mut count = 0;
-        for own in &settings {
-            ranges.push(count..count + own.len());
-            count += own.len();
-        }
-        let flat: Vec<&Setting> = settings.iter().flatten().collect();
+        let ranges = ranges(&settings);
+        let count = ranges.last().map_or(0, |last| last.end);
         let normals: Vec<Normal> = (traces.par_iter())
             .map(|(world, trace)| {
-                let of_some = |some: &[&Setting]| columns_of(some.iter().copied(), world, trace);
-                let columns: Vec<Vec<Vec<f32>>> = (flat.par_chunks(TOGETHER))
-                    .map(of_some)
-                    .collect::<Result<_, Error>>()?;
-                Ok(normal_of(trace, &columns.concat()))
+                let others = each_beside(settings.iter().flatten().cloned(), world)?;
+                Ok(normal(others, trace))
             })
             .collect::<Result<_, Error>>()?;
-        let nothing = || normal_of(&Trace::default(), &vec![Vec::new(); count]);
+        let nothing = || Normal::zeros(count);
         let of_run = |run: usize| {
             let own = (evidence.stretches.iter().zip(&normals)).filter(|(stretch, _)| stretch.run == run);
             Normal::sum(own.map(|(_, normal)| normal.clone())).unwrap_or_else(nothing)

@@ -1,43 +1,20 @@
 //! Linear algebra on the columns: what each variant would explain.
 
+use std::ops::Range;
+
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use sim::{Error, Setting, World};
 
 use super::catalogue::Variant;
-use super::columns::columns_of;
-use super::filter::{MEASURED, Trace};
-
-/// Normal equations of a variant's columns against the innovations, of one run.
-#[derive(Debug, Clone)]
-pub(crate) struct Normal {
-    /// C^T e and C^T C.
-    pub(crate) right: DVector<f64>,
-    pub(crate) left: DMatrix<f64>,
-    /// The same for columns that grow with time: the cross term with the constant ones, and their own.
-    pub(crate) right_time: DVector<f64>,
-    pub(crate) cross_time: DMatrix<f64>,
-    pub(crate) left_time: DMatrix<f64>,
-}
-
-impl Normal {
-    /// The equations of several runs together; `None` of none.
-    pub(crate) fn sum(normals: impl Iterator<Item = Self>) -> Option<Self> {
-        normals.reduce(|a, b| Self {
-            right: a.right + b.right,
-            left: a.left + b.left,
-            right_time: a.right_time + b.right_time,
-            cross_time: a.cross_time + b.cross_time,
-            left_time: a.left_time + b.left_time,
-        })
-    }
-}
-
-/// Variants whose columns are taken in one pass over a trace.
-pub(crate) const TOGETHER: usize = 8;
+use super::columns::{ABREAST, each_beside, normals as normals_of_lots};
+use super::filter::Trace;
+use super::normal::{Normal, Products};
 
 /// The normal equations of every variant (outer) in every run (inner).
 pub(crate) fn normals(runs: &[(World<'_>, Trace)], variants: &[Variant]) -> Result<Vec<Vec<Normal>>, Error> {
+    /// Lots of variants that one pass over a trace is made for.
+    const LOTS: usize = 4;
     let of_some = |some: &[Variant]| -> Result<Vec<Vec<Normal>>, Error> {
         let by_run = (runs.iter())
             .map(|run| normals_of_run(run, some))
@@ -45,58 +22,48 @@ pub(crate) fn normals(runs: &[(World<'_>, Trace)], variants: &[Variant]) -> Resu
         let of_variant = |i: usize| by_run.iter().map(|normals| normals[i].clone()).collect();
         Ok((0..some.len()).map(of_variant).collect())
     };
-    let parts: Vec<Vec<Vec<Normal>>> = (variants.par_chunks(TOGETHER))
+    let parts: Vec<Vec<Vec<Normal>>> = (variants.par_chunks(LOTS * ABREAST))
         .map(of_some)
         .collect::<Result<_, _>>()?;
     Ok(parts.concat())
 }
 
 fn normals_of_run((world, trace): &(World<'_>, Trace), variants: &[Variant]) -> Result<Vec<Normal>, Error> {
-    let settings: Vec<Vec<Setting>> = variants.iter().map(Variant::settings).collect();
-    let mut found = columns_of(settings.iter().flatten(), world, trace)?.into_iter();
-    let normal = |own: &Vec<Setting>| {
-        let columns: Vec<Vec<f32>> = found.by_ref().take(own.len()).collect();
-        normal_of(trace, &columns)
+    // Columns of one variant are wanted with each other, those of several are not.
+    let stands_alone = |variant: &Variant| variant.sizes.len() == 1;
+    let lots: Vec<&[Variant]> = variants
+        .chunk_by(|a, b| stands_alone(a) && stands_alone(b))
+        .flat_map(|lot| lot.chunks(ABREAST))
+        .collect();
+    let lots: Vec<Vec<Vec<Setting>>> = (lots.iter())
+        .map(|lot| lot.iter().map(Variant::settings).collect())
+        .collect();
+    let others = (lots.iter())
+        .map(|lot| {
+            let wanted = if lot.len() > 1 {
+                Products::Squares
+            } else {
+                Products::All
+            };
+            Ok((each_beside(lot.iter().flatten().cloned(), world)?, wanted))
+        })
+        .collect::<Result<_, Error>>()?;
+    let parts = |(normal, lot): (Normal, &Vec<Vec<Setting>>)| -> Vec<Normal> {
+        ranges(lot).iter().map(|own| normal.part(own)).collect()
     };
-    Ok(settings.iter().map(normal).collect())
+    let normals = normals_of_lots(others, trace).into_iter();
+    Ok(normals.zip(&lots).flat_map(parts).collect())
 }
 
-/// Normal equations of columns.
-pub(crate) fn normal_of(trace: &Trace, columns: &[Vec<f32>]) -> Normal {
-    let k = columns.len();
-    let mut sum = Normal {
-        right: DVector::zeros(k),
-        left: DMatrix::zeros(k, k),
-        right_time: DVector::zeros(k),
-        cross_time: DMatrix::zeros(k, k),
-        left_time: DMatrix::zeros(k, k),
+/// Where the columns of each variant stand among those of all, by the settings of each.
+pub(super) fn ranges(settings: &[Vec<Setting>]) -> Vec<Range<usize>> {
+    let mut end = 0;
+    let range = |own: &Vec<Setting>| {
+        let start = end;
+        end += own.len();
+        start..end
     };
-    for (step, instant) in trace.instants.iter().enumerate() {
-        let at = step * MEASURED..(step + 1) * MEASURED;
-        let time_s = instant.time_s;
-        for a in 0..k {
-            let ca = &columns[a][at.clone()];
-            // The trace holds what was seen less what was expected, the column the change of that difference.
-            let right = -ca
-                .iter()
-                .zip(&instant.innovation)
-                .map(|(&c, e)| f64::from(c) * e)
-                .sum::<f64>();
-            sum.right[a] += right;
-            sum.right_time[a] += right * time_s;
-            for b in 0..=a {
-                let cb = &columns[b][at.clone()];
-                let product = f64::from(ca.iter().zip(cb).map(|(x, y)| x * y).sum::<f32>());
-                sum.left[(a, b)] += product;
-                sum.cross_time[(a, b)] += product * time_s;
-                sum.left_time[(a, b)] += product * time_s * time_s;
-            }
-        }
-    }
-    for sum in [&mut sum.left, &mut sum.cross_time, &mut sum.left_time] {
-        sum.fill_upper_triangle_with_lower_triangle();
-    }
-    sum
+    settings.iter().map(range).collect()
 }
 
 /// Multiples that fit best and the log-likelihood they gain.

@@ -209,9 +209,13 @@ fn a_wall_that_moves_beside_a_world_moves_once() {
     let exact = [[0.0; 3]; 3];
     plain.tick(200.0);
     let look = plain.readings(pose, &exact).look;
-    let expected = still.readings_beside(pose, &exact, &look);
+    let expected = still.readings_beside(pose, &exact, &look, None);
     moving.tick(200.0);
-    for (reading, expected) in moving.readings_beside(pose, &exact, &look).iter().zip(expected) {
+    for (reading, expected) in moving
+        .readings_beside(pose, &exact, &look, None)
+        .iter()
+        .zip(expected)
+    {
         assert!((reading - expected).abs() < 1e-9, "{reading} for {expected}");
     }
     assert!(expected != plain.readings(pose, &exact).mean);
