@@ -387,7 +387,7 @@ fn a_rounding_is_found_beside_another_one() {
 
 #[test]
 fn a_light_that_goes_over_the_runs_is_seen_beside_wheels_that_slip_much() {
-    const SLIP: f64 = 4.2;
+    const SLIP: f64 = 3.0;
     const COUNTS: [f64; 4] = [43.7, 17.3, 11.4, 6.9];
     const AZIMUTH_RAD: f64 = 2.126;
     let mut robot = Robot::with(Setting::constant(sim::find("slip-level").unwrap(), [SLIP]));

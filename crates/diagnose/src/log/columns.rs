@@ -37,7 +37,8 @@ pub(super) fn normals(lots: Vec<(Vec<Other<'_>>, Products)>, trace: &Trace) -> V
             others
                 .iter_mut()
                 .for_each(|others| others.step(instant, trace.step_counts));
-            sums.add(instant, others.iter().map(|others| &others.changes));
+            let changes = others.iter().map(|others| &others.changes);
+            sums.add(instant.time_s, &instant.innovation, changes);
         }
     }
     lots.into_iter().map(|(_, sums)| sums.into()).collect()
@@ -71,6 +72,7 @@ struct Others<'w> {
     changes: Changes,
 }
 
+/// A lot as models side by side, in its order.
 fn abreast(mut lot: Vec<Other<'_>>) -> Vec<Others<'_>> {
     let mut all = Vec::new();
     while !lot.is_empty() {

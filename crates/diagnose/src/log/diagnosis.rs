@@ -15,7 +15,7 @@ use super::leads::Lead;
 use super::recut::recut;
 use super::refined::Refined;
 use super::rows::{LogRow, LoggedRun, bridged, without_logs};
-use super::search::Search;
+use super::search::{NOT_FAR, RIVAL, Search};
 use super::steps::{reading_step, written_step};
 use super::unnamed::Unnamed;
 use crate::answer::{ALTERNATIVE, indistinguishable};
@@ -106,7 +106,8 @@ pub fn diagnose_logs(
             "the readings that count with {}",
             search.best_in_words()
         ));
-        search = search.renewed(clear)?;
+        // They are refined once more when it is known where the walls are cut.
+        search = search.renewed(clear, RIVAL)?;
     }
     let logs = Logs {
         scene: &scene,
@@ -158,7 +159,12 @@ impl Logs<'_> {
         }
         let declared = (self.declared).elsewhere(again.as_ref().map_or(self.scene, |found| &found.1));
         let clear = declared.clear_with_each(search.rivals());
-        self.one_more_beside(search.renewed(clear.unwrap_or(declared))?, found, further, rest)
+        self.one_more_beside(
+            search.renewed(clear.unwrap_or(declared), NOT_FAR)?,
+            found,
+            further,
+            rest,
+        )
     }
 
     /// The answer of a search that may find one more effect.

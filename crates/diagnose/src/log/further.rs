@@ -67,8 +67,6 @@ impl Search<'_> {
         more.iter_mut().for_each(|several| several.faults = owed);
         self.found.extend(more);
         self.sort();
-        let best = self.found[0].clone();
-        self.settle(&best);
     }
 
     /// Log-likelihood that a column must gain beside the best candidate to be more than a fault of the filter, which is linear

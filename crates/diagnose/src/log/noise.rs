@@ -1,7 +1,7 @@
 //! Effects on noise: judged by the log-likelihood alone, after everything that has a mean.
 
 use std::collections::BTreeMap;
-use std::ops::ControlFlow;
+use std::ops::{ControlFlow, Range};
 
 use sim::{Pattern, Setting, Spec, find};
 use statrs::distribution::{ContinuousCDF, StudentsT};
@@ -10,7 +10,7 @@ use statrs::statistics::Statistics;
 use super::evidence::Evidence;
 use super::leads::{By, tail};
 use super::refined::Refined;
-use super::repeat::repeats;
+use super::repeat::{REPEATS, some_repeats};
 use crate::slip::memory_of;
 
 /// The effects on noise.
@@ -73,20 +73,34 @@ pub(crate) fn p_among_repeats(
 ) -> f64 {
     /// Log-likelihood that no fault of the filter gains.
     const SURE: f64 = 50.0;
+    /// The logs that are simulated first, those that follow, and the probability that the first alone make of what is plainly chance.
+    const FIRST: Range<u64> = 0..REPEATS / 2;
+    const OTHERS: Range<u64> = REPEATS / 2..REPEATS;
+    const PLAINLY: f64 = 0.5;
+    /// How far to either side the first parabola of a simulated log reaches.
+    const NEAR: f64 = 0.06;
     let of_factor = |factor: &Factor| {
         let p = factor.p();
         if p >= level || factor.gain > faults.max(SURE) && !evidence.is_coarse() {
             return p;
         }
-        let logs = repeats(evidence, settings, |repeated| {
+        let of_log = |repeated: &Evidence<'_>| {
             let base = repeated.likelihood(settings)?;
-            Some(
-                Factor::neutral(factor.spec)
-                    .best(repeated, settings, base)?
-                    .middle,
-            )
-        });
-        p_among(factor.middle, &logs).map_or(p, |among| p.max(FACTORS * among).min(1.0))
+            let near = Factor {
+                half: NEAR,
+                ..Factor::neutral(factor.spec)
+            };
+            Some(near.best(repeated, settings, base)?.middle)
+        };
+        let among =
+            |logs: &[f64]| p_among(factor.middle, logs).map_or(p, |among| p.max(FACTORS * among).min(1.0));
+        let mut logs = some_repeats(evidence, settings, FIRST, of_log);
+        let first = among(&logs);
+        if first > PLAINLY {
+            return first;
+        }
+        logs.extend(some_repeats(evidence, settings, OTHERS, of_log));
+        among(&logs)
     };
     noise.iter().map(of_factor).fold(1.0, f64::min)
 }

@@ -5,7 +5,7 @@ use std::ops::Range;
 use nalgebra::{DMatrix, DVector};
 
 use super::columns::{ABREAST, Changes, NO_CHANGES, Numbers};
-use super::filter::{Instant, MEASURED};
+use super::filter::MEASURED;
 
 /// Normal equations of columns against the innovations, of one stretch or more.
 #[derive(Debug, Clone)]
@@ -131,8 +131,13 @@ impl Sums {
         }
     }
 
-    /// Adds a control step of all columns.
-    pub(super) fn add<'c>(&mut self, instant: &Instant, columns: impl Iterator<Item = &'c Changes> + Clone) {
+    /// Adds a control step of all columns against its innovations.
+    pub(super) fn add<'c>(
+        &mut self,
+        time_s: f64,
+        innovation: &[f64; MEASURED],
+        columns: impl Iterator<Item = &'c Changes> + Clone,
+    ) {
         let mut block = 0;
         for (a, own) in columns.clone().enumerate() {
             let others = match self.wanted {
@@ -143,8 +148,7 @@ impl Sums {
                 block += others;
                 continue;
             }
-            self.add_right(a, own, instant);
-            let time_s = instant.time_s;
+            self.add_right(a, own, innovation, time_s);
             match self.wanted {
                 Products::Squares => self.add_row((a, 0), |m, k| own[m][k] * own[m][k], time_s),
                 Products::All => {
@@ -160,14 +164,14 @@ impl Sums {
     }
 
     /// The trace holds what was seen less what was expected, the column the change of that difference.
-    fn add_right(&mut self, a: usize, own: &Changes, instant: &Instant) {
+    fn add_right(&mut self, a: usize, own: &Changes, innovation: &[f64; MEASURED], time_s: f64) {
         let mut right = [0.0; ABREAST];
-        for (change, innovation) in own.iter().zip(&instant.innovation) {
+        for (change, innovation) in own.iter().zip(innovation) {
             (0..ABREAST).for_each(|k| right[k] -= change[k] * innovation);
         }
         for k in 0..ABREAST {
             self.right[a][k] += right[k];
-            self.right_time[a][k] += right[k] * instant.time_s;
+            self.right_time[a][k] += right[k] * time_s;
         }
     }
 
@@ -210,5 +214,94 @@ impl From<Sums> for Normal {
             cross_time: block(&sums.cross_time),
             left_time: block(&sums.left_time),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const COUNT: usize = 11;
+    const STEPS: usize = 5;
+
+    fn time_s(step: usize) -> f64 {
+        0.5 + step as f64
+    }
+
+    fn wave(step: usize, m: usize, by: f64) -> f64 {
+        (by * (1 + step * MEASURED + m) as f64).sin()
+    }
+
+    /// Eleven columns side by side, of which none changes anything in the first step.
+    fn sums(wanted: Products) -> Normal {
+        let mut sums = Sums::new(COUNT, wanted);
+        for step in 0..STEPS {
+            let change = |m: usize, column: usize| {
+                let nothing = step == 0 || column >= COUNT;
+                if nothing {
+                    0.0
+                } else {
+                    wave(step, m, 0.3 + column as f64)
+                }
+            };
+            let abreast = [0, ABREAST].map(|first| -> Changes {
+                std::array::from_fn(|m| std::array::from_fn(|k| change(m, first + k)))
+            });
+            let innovation = std::array::from_fn(|m| wave(step, m, 0.7));
+            sums.add(time_s(step), &innovation, abreast.iter());
+        }
+        sums.into()
+    }
+
+    fn design() -> (DMatrix<f64>, DVector<f64>, DMatrix<f64>) {
+        let rows = STEPS * MEASURED;
+        let columns = DMatrix::from_fn(rows, COUNT, |row, column| {
+            let (step, m) = (row / MEASURED, row % MEASURED);
+            if step == 0 {
+                0.0
+            } else {
+                wave(step, m, 0.3 + column as f64)
+            }
+        });
+        let missed = DVector::from_fn(rows, |row, _| -wave(row / MEASURED, row % MEASURED, 0.7));
+        let times = DMatrix::from_diagonal(&DVector::from_fn(rows, |row, _| time_s(row / MEASURED)));
+        (columns, missed, times)
+    }
+
+    fn are_alike(found: &DMatrix<f64>, expected: &DMatrix<f64>) {
+        assert!((found - expected).amax() < 1e-9, "{found} for {expected}");
+    }
+
+    #[test]
+    fn columns_side_by_side_have_the_normal_equations_of_their_matrix() {
+        let (columns, missed, times) = design();
+        let (found, transposed) = (sums(Products::All), columns.transpose());
+        are_alike(&found.left, &(&transposed * &columns));
+        are_alike(&found.cross_time, &(&transposed * &times * &columns));
+        are_alike(&found.left_time, &(&transposed * &times * &times * &columns));
+        assert!((&found.right - &transposed * &missed).amax() < 1e-9);
+        assert!((&found.right_time - &transposed * &times * &missed).amax() < 1e-9);
+    }
+
+    #[test]
+    fn squares_are_the_diagonal() {
+        let (all, squares) = (sums(Products::All), sums(Products::Squares));
+        are_alike(&squares.left, &DMatrix::from_diagonal(&all.left.diagonal()));
+        are_alike(
+            &squares.left_time,
+            &DMatrix::from_diagonal(&all.left_time.diagonal()),
+        );
+        assert_eq!(squares.right, all.right);
+    }
+
+    #[test]
+    fn some_columns_among_others_keep_their_equations() {
+        let all = sums(Products::All);
+        let part = all.part(&(3..5));
+        assert_eq!(part.left[(0, 1)], all.left[(3, 4)]);
+        let among = part.among(4, &[(3, 2.0), (1, 1.0)]);
+        assert_eq!(among.left[(3, 1)], 2.0 * all.left[(3, 4)]);
+        assert_eq!(among.right[3], 2.0 * all.right[3]);
+        assert_eq!((among.right[0], among.left[(0, 3)]), (0.0, 0.0));
     }
 }

@@ -1,19 +1,33 @@
 //! Logs simulated of an answer: what becomes of them tells what to make of the measured ones.
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 use sim::{Run, Setting, Streams, find};
 
 use super::evidence::Evidence;
 use super::rows::LogRow;
 
-/// What `of` makes of logs of robots with these effects, eight times as many as were measured, with readings rounded as the
+/// Times as many logs as were measured that are simulated in all.
+pub(crate) const REPEATS: u64 = 8;
+
+/// What `of` makes of logs of robots with these effects, [`REPEATS`] times as many as were measured, with readings rounded as the
 /// measured ones.
 pub(crate) fn repeats<R: Send>(
     evidence: &Evidence<'_>,
     settings: &[Setting],
     of: impl Fn(&Evidence<'_>) -> Option<R> + Sync,
 ) -> Vec<R> {
-    const REPEATS: u64 = 8;
+    some_repeats(evidence, settings, 0..REPEATS, of)
+}
+
+/// The same of some of these logs, by their numbers.
+pub(crate) fn some_repeats<R: Send>(
+    evidence: &Evidence<'_>,
+    settings: &[Setting],
+    numbers: Range<u64>,
+    of: impl Fn(&Evidence<'_>) -> Option<R> + Sync,
+) -> Vec<R> {
     let mut rounded = settings.to_vec();
     rounded.extend(find("reading-step").map(|spec| Setting::constant(spec, [evidence.step_counts])));
     let one = |repeat: u64| {
@@ -21,7 +35,7 @@ pub(crate) fn repeats<R: Send>(
         let runs: Vec<&[LogRow]> = logs.iter().map(Vec::as_slice).collect();
         of(&Evidence::new(evidence.scene, evidence.models, &runs, evidence.step_counts).ok()?)
     };
-    (0..REPEATS).into_par_iter().filter_map(one).collect()
+    numbers.into_par_iter().filter_map(one).collect()
 }
 
 /// One log for each run, as long as what was used of the measured one.

@@ -35,6 +35,10 @@ pub(super) const PROMISING: usize = 8;
 pub(super) const STEPS: usize = 8;
 pub(super) const FIRST_STEPS: usize = 2;
 
+/// Shares of the best score with which a single effect may change places with it, and with which it is not far behind.
+pub(super) const RIVAL: f64 = 0.8;
+pub(super) const NOT_FAR: f64 = 0.5;
+
 /// What further effects would gain beside an explanation.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Remainder {
@@ -250,21 +254,21 @@ impl<'a> Search<'a> {
 
     /// The effects of the best candidates, which may change places where other readings count.
     pub(super) fn rivals(&self) -> impl Iterator<Item = &[Setting]> {
-        const NEARLY: f64 = 0.8;
         const MOST: usize = 3;
         let best = self.found.first().map_or(0.0, Refined::score);
         (self.found.iter().take(MOST))
-            .filter(move |other| other.score() >= NEARLY * best)
+            .filter(move |other| other.score() >= RIVAL * best)
             .map(|other| other.settings.as_slice())
     }
 
-    /// The same search with other evidence, its candidates refined again by it; not those far behind several effects.
-    pub(super) fn renewed<'b>(self, evidence: Evidence<'b>) -> Result<Search<'b>, Error> {
+    /// The same search with other evidence, its candidates refined again by it, but for those far behind: single effects with less than
+    /// a share of the best score. Of several effects most is known already.
+    pub(super) fn renewed<'b>(self, evidence: Evidence<'b>, share: f64) -> Result<Search<'b>, Error> {
         let mut renewed = Search::new(evidence, self.rounding_counts)?;
-        let least = if self.best().len() > 1 {
-            least_in_reach(self.found.iter())
-        } else {
-            f64::NEG_INFINITY
+        let best = self.found.first();
+        let least = match best {
+            Some(best) if best.settings.len() == 1 => share * best.score(),
+            _ => least_in_reach(best.into_iter()),
         };
         let base = renewed.total();
         let again = |found: &Refined| {
@@ -274,7 +278,7 @@ impl<'a> Search<'a> {
                 found.again(&renewed.evidence, &renewed.variants, base, STEPS)
             }
         };
-        let found = self.found.iter().filter_map(again).collect();
+        let found = self.found.par_iter().filter_map(again).collect();
         (renewed.p, renewed.detectable, renewed.found) = (self.p, self.detectable, found);
         renewed.sort();
         Ok(renewed)
@@ -289,6 +293,9 @@ impl<'a> Search<'a> {
 
     /// Whether what is left matters, and how well the answer's sizes are known.
     pub(super) fn finish(&mut self) {
+        if let Some(best) = self.found.first().cloned() {
+            self.settle(&best);
+        }
         self.judge();
         self.settle_beside_unnamed();
         if let (Some(best), None, None) = (self.found.first_mut(), self.rounding_counts, &self.unnamed) {
