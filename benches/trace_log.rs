@@ -7,12 +7,15 @@ use diagnose::{LogRow, LoggedRun, diagnose_logs};
 use ground::{braitenberg, circuit, model};
 use sim::{Scene, Setting, Streams};
 
+/// Effects by name, with their values.
+type Effects = &'static [(&'static str, &'static [f64])];
+
 const RUNS: usize = 4;
 const LAPS: usize = 5;
 
 fn main() {
     let mut criterion = Criterion::default().configure_from_args();
-    let robots: [(&str, &[(&str, &[f64])]); 3] = [
+    let robots: [(&str, Effects); 3] = [
         ("as-declared", &[]),
         ("one-effect", &[("wheel-asymmetry", &[1.02])]),
         (

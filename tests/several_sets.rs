@@ -32,8 +32,15 @@ fn sets_with_different_declarations_are_traced_together() {
     holds(&found["effects"][0], "ratio", LIMPING, 1.0);
     let held_out = serde_json::json!(["set/a", "set/b", "reactive/a", "reactive/b"]);
     assert_eq!(found["error"]["held_out"], held_out);
+}
 
-    // What is held out of the second set is held against simulations of the second declaration.
+#[test]
+fn what_is_held_out_is_held_against_the_declaration_that_it_has() {
+    let scratch = Scratch::new();
+    let robot = limping().logged(&[3; 2]);
+    robot.record(&scratch, "set");
+    let reactive = reactive(robot);
+    reactive.record(&scratch, "reactive");
     let longer = Robot {
         laps: vec![5; 2],
         ..reactive
@@ -45,6 +52,10 @@ fn sets_with_different_declarations_are_traced_together() {
         found["error"]["held_out"],
         serde_json::json!(["unseen/a", "unseen/b"])
     );
+    let [before, after, floor] =
+        ["before", "after", "floor"].map(|key| found["error"][key].as_f64().unwrap());
+    // The other declaration's laps are elsewhere.
+    assert!(after < 1.6 * floor && before > 2.0 * after, "{found:#}");
     let gates = scratch.read("out/gates.csv");
     let rows: Vec<&str> = gates.lines().skip(1).collect();
     assert!(
