@@ -64,6 +64,7 @@ pub(crate) fn by_chance(noise: &[Factor]) -> f64 {
 /// robots as declared the slip level is found 2 to 4 % low, with a stated error of 0.5 %. A gain that this could make is
 /// compared with those in simulated logs (Student's t), and so is one of `faults` or less; one whose p is `level` or more by the
 /// likelihood stays as it is. Readings in coarse steps are no normal numbers: no gain is beyond their faults.
+/// Half of the logs are enough where these make plain chance of it.
 pub(crate) fn p_among_repeats(
     evidence: &Evidence<'_>,
     settings: &[Setting],
