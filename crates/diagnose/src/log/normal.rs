@@ -42,13 +42,12 @@ impl Normal {
         })
     }
 
-    /// The equations of some neighbouring columns alone.
-    pub(crate) fn part(&self, columns: &Range<usize>) -> Self {
-        let rows = |of: &DVector<f64>| of.rows(columns.start, columns.len()).into_owned();
-        let block = |of: &DMatrix<f64>| {
-            let at = (columns.start, columns.start);
-            of.view(at, (columns.len(), columns.len())).into_owned()
-        };
+    /// The equations of other columns, each vector and each matrix made from these.
+    fn map(
+        &self,
+        rows: impl Fn(&DVector<f64>) -> DVector<f64>,
+        block: impl Fn(&DMatrix<f64>) -> DMatrix<f64>,
+    ) -> Self {
         Self {
             right: rows(&self.right),
             left: block(&self.left),
@@ -56,6 +55,16 @@ impl Normal {
             cross_time: block(&self.cross_time),
             left_time: block(&self.left_time),
         }
+    }
+
+    /// The equations of some neighbouring columns alone.
+    pub(crate) fn part(&self, columns: &Range<usize>) -> Self {
+        let rows = |of: &DVector<f64>| of.rows(columns.start, columns.len()).into_owned();
+        let block = |of: &DMatrix<f64>| {
+            let at = (columns.start, columns.start);
+            of.view(at, (columns.len(), columns.len())).into_owned()
+        };
+        self.map(rows, block)
     }
 
     /// The equations of `count` columns of which these are some, at their places and times these factors; the others hold nothing.
@@ -76,13 +85,7 @@ impl Normal {
             }
             all
         };
-        Self {
-            right: rows(&self.right),
-            left: block(&self.left),
-            right_time: rows(&self.right_time),
-            cross_time: block(&self.cross_time),
-            left_time: block(&self.left_time),
-        }
+        self.map(rows, block)
     }
 }
 
