@@ -7,11 +7,11 @@ use track::{Chain, Side, Vec2};
 pub struct WallPlace {
     /// Which wall.
     pub side: Side,
-    /// Fraction of the exact wall's length from its first joint in driving direction, in [0, 1].
+    /// Fraction of the exact wall's length from its first joint in driving direction, in [0, 1).
     pub fraction: f64,
 }
 
-/// What is remembered of a straight piece: the wall and the stretch of it that the piece stands for.
+/// What is remembered of a straight piece: the wall and the stretch of it that the piece stands for, by fractions in [0, 2).
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Piece {
     side: Side,
@@ -27,6 +27,8 @@ struct Piece {
 pub struct Walls {
     x_m: Vec<f64>,
     y_m: Vec<f64>,
+    /// Of each segment, to the left of its direction.
+    normals: Vec<Vec2>,
     pieces: Vec<Option<Piece>>,
 }
 
@@ -43,7 +45,7 @@ impl Walls {
                     side,
                     chain
                         .segments()
-                        .map(|(a, b)| (a.position, [a.fraction, b.fraction])),
+                        .map(|(a, b)| (a.position, stretch(a.fraction, b.fraction))),
                 );
             }
         }
@@ -68,10 +70,7 @@ impl Walls {
 
     fn push_outline(&mut self, side: Side, vertices: impl Iterator<Item = (Vec2, [f64; 2])>) {
         let first = self.x_m.len();
-        for (position, mut fractions) in vertices {
-            if fractions[1] < fractions[0] {
-                fractions[1] += 1.0; // the piece that closes the wall
-            }
+        for (position, fractions) in vertices {
             self.x_m.push(position.x);
             self.y_m.push(position.y);
             self.pieces.push(Some(Piece { side, fractions }));
@@ -80,6 +79,11 @@ impl Walls {
             self.x_m.push(self.x_m[first]);
             self.y_m.push(self.y_m[first]);
             self.pieces.push(None);
+            for i in first..self.x_m.len() - 1 {
+                let along = self.vertex(i + 1) - self.vertex(i);
+                self.normals.push(along.normalize_or_zero().perp());
+            }
+            self.normals.push(Vec2::ZERO);
         }
     }
 
@@ -89,7 +93,7 @@ impl Walls {
                 continue;
             };
             let left = along.perp() * half_m;
-            let (from, to) = (a.fraction, b.fraction);
+            let [from, to] = stretch(a.fraction, b.fraction);
             let corners = [
                 (a.position + left, [from, to]),
                 (b.position + left, [to, to]),
@@ -149,10 +153,9 @@ impl Walls {
     }
 
     /// Unit vector across a segment, to the left of its direction.
+    #[inline]
     pub fn normal(&self, segment: usize) -> Vec2 {
-        (self.vertex(segment + 1) - self.vertex(segment))
-            .normalize_or_zero()
-            .perp()
+        self.normals[segment]
     }
 
     /// The place on the exact wall that a point of a segment stands for.
@@ -162,9 +165,10 @@ impl Walls {
         let along =
             ((point - a).dot(b - a) / (b - a).length_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
         let [from, to] = piece.fractions;
+        let fraction = from + along * (to - from);
         WallPlace {
             side: piece.side,
-            fraction: (from + along * (to - from)).rem_euclid(1.0),
+            fraction: if fraction < 1.0 { fraction } else { fraction - 1.0 },
         }
     }
 
@@ -177,6 +181,11 @@ impl Walls {
     }
 }
 
+/// The fractions of a wall's length from one point of it on to another, the second in [0, 2): the last piece goes on to the first point.
+fn stretch(from: f64, to: f64) -> [f64; 2] {
+    [from, if to < from { to + 1.0 } else { to }]
+}
+
 /// The point of the segment from `a` to `b` that is nearest to `p`.
 #[inline]
 pub(crate) fn nearest_on_segment(a: Vec2, b: Vec2, p: Vec2) -> Vec2 {
@@ -186,4 +195,36 @@ pub(crate) fn nearest_on_segment(a: Vec2, b: Vec2, p: Vec2) -> Vec2 {
         return a;
     }
     a + along * ((p - a).dot(along) / length2).clamp(0.0, 1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Scene;
+    use crate::effects::testing::{declared, scene};
+
+    #[test]
+    fn both_faces_of_a_thick_wall_are_where_its_middle_is() {
+        const THICKNESS_M: f64 = 0.01;
+        let mut model = declared();
+        model.wall.thickness_m = THICKNESS_M;
+        let scene = Scene::new(scene().circuit().clone().into(), &model, None).unwrap();
+        let course = &scene.circuit().course;
+        for (segment, a, b) in scene.walls().segments() {
+            for point in [0.01, 0.3, 0.5, 0.99].map(|share| a + (b - a) * share) {
+                let place = scene.walls().place(segment, point);
+                let wall = match place.side {
+                    Side::Outer => &course.outer,
+                    Side::Inner => &course.inner,
+                };
+                assert!((0.0..1.0).contains(&place.fraction), "{place:?}");
+                // Half of the thickness, what cutting the wall is off, and what the way along a bend is longer than its chord.
+                let off_m = wall.point(place.fraction).distance(point);
+                assert!(
+                    off_m < THICKNESS_M + model.wall.max_error_m,
+                    "{place:?}: {off_m} m"
+                );
+            }
+        }
+    }
 }
