@@ -22,9 +22,7 @@ pub struct Outlook {
 /// What the rays along the sensors' axes met.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Look {
-    /// Distance, m; infinite where there is no wall.
-    pub distance_m: [f64; LANES],
-    /// Standard deviation of that distance, m.
+    /// Standard deviation of the distance, m; 0 where there is no wall.
     pub deviation_m: [f64; LANES],
     rays: Rays,
     hits: Hits,
@@ -38,15 +36,10 @@ pub struct Look {
 #[derive(Debug)]
 pub struct Places([Option<(Hit, f64)>; LANES]);
 
-/// One ray of one sensor: its distance, how that changes with the pose, its standard deviation, and what effects make
-/// of its response.
-#[derive(Clone, Copy)]
-struct Glance {
-    distance_m: f64,
-    slope: [f64; 3],
-    deviation_m: f64,
-    factor: f64,
-    bend: Bend,
+/// Eight rays, one of each sensor: how their distances change with x, y and heading, and the standard deviations of these, m.
+struct Doubt {
+    slope: [[f64; LANES]; 3],
+    deviation_m: [f64; LANES],
 }
 
 /// Distances along eight rays, m, and what effects make of their responses.
@@ -68,60 +61,66 @@ impl Met {
     }
 }
 
-/// A response at a distance, its derivative (counts/m) and its second derivative (counts/m^2).
-#[derive(Clone, Copy)]
-struct Bend {
-    value: f64,
-    rise: f64,
-    curve: f64,
+/// Probabilities that eight uncertain distances are within the range, and their densities there (1/m).
+struct InRange {
+    seen: [f64; LANES],
+    density: [f64; LANES],
+}
+
+/// What the rays of all sights add up to: as in [`Outlook`], axis by axis.
+#[derive(Default)]
+struct Total {
+    mean: Readings,
+    slope: [[f64; LANES]; 3],
+    edge_variance: Readings,
+    /// What effects add to a factor of 1, of sensors that average distances.
+    factor: [f64; LANES],
+}
+
+/// Standard deviations of a distance beyond which it is surely within the range, or surely not.
+const SURE: f64 = 4.0;
+
+/// Responses at eight distances, their derivatives (counts/m) and their second derivatives (counts/m^2).
+struct Bends {
+    value: Readings,
+    rise: Readings,
+    curve: Readings,
 }
 
 impl Apparatus<'_> {
     /// The responses of all sensors, before effects on readings.
     pub(crate) fn outlook(&self, pose: Pose, covariance: &PoseMatrix) -> Outlook {
-        let mut outlook = Outlook {
-            mean: [0.0; LANES],
-            slope: [[0.0; 3]; LANES],
-            edge_variance: [0.0; LANES],
-            look: Look {
-                distance_m: [f64::INFINITY; LANES],
-                deviation_m: [0.0; LANES],
-                rays: self.sights[0].rays.placed(pose),
-                hits: Hits::NONE,
-                factor: [1.0; LANES],
-                response: [0.0; LANES],
-            },
-        };
+        let mut look = Look::default();
+        let mut total = Total::default();
         let middle = self.sights.len() / 2;
         for (number, sight) in self.sights.iter().enumerate() {
             let (rays, hits) = self.cast(pose, sight);
             let met = self.met(&rays, &hits);
-            if number == middle {
-                (outlook.look.rays, outlook.look.hits) = (rays, hits);
-                (outlook.look.distance_m, outlook.look.factor) = (hits.distance_m, met.factor);
+            let doubt = self.doubt(pose, covariance, &rays, &hits);
+            match self.machine.beam.combine {
+                Combine::Responses => self.add_responses(&mut total, sight.weight, &met, &doubt),
+                Combine::Distances => self.add_shortfalls(&mut total, sight.weight, &met, &doubt),
             }
-            let bends = bends(&self.machine.response, &met.distance_m);
-            for lane in (0..LANES).filter(|&lane| hits.distance_m[lane].is_finite()) {
-                let slope = self.distance_slope(pose, &rays, &hits, lane);
-                let deviation_m = quadratic(covariance, slope).max(0.0).sqrt();
-                if number == middle {
-                    outlook.look.deviation_m[lane] = deviation_m;
-                }
-                let glance = Glance {
-                    distance_m: met.distance_m[lane],
-                    slope,
-                    deviation_m,
-                    factor: met.factor[lane],
-                    bend: bends[lane],
+            if number == middle {
+                look = Look {
+                    deviation_m: doubt.deviation_m,
+                    rays,
+                    hits,
+                    factor: met.factor,
+                    ..look
                 };
-                self.add_ray(&mut outlook, lane, sight.weight, glance);
             }
         }
         if self.machine.beam.combine == Combine::Distances {
-            self.respond_to_mean_distance(&mut outlook);
+            self.respond_to_mean_distance(&mut total);
         }
-        outlook.look.response = outlook.mean;
-        outlook
+        look.response = total.mean;
+        Outlook {
+            mean: total.mean,
+            slope: std::array::from_fn(|lane| total.slope.map(|of_axis| of_axis[lane])),
+            edge_variance: total.edge_variance,
+            look,
+        }
     }
 
     /// Distances along the sensors' axes, m; infinite where there is no wall.
@@ -152,17 +151,15 @@ impl Apparatus<'_> {
     }
 
     fn responses_to(&self, met: &Met, look: &Look) -> Readings {
-        let bends = bends(&self.machine.response, &met.distance_m);
+        let Bends { value, curve, .. } = bends(&self.machine.response, &met.distance_m);
+        let InRange { seen, .. } = self.in_range(met, &look.deviation_m);
         std::array::from_fn(|lane| {
-            if !look.hits.distance_m[lane].is_finite() {
-                return 0.0;
+            if look.hits.distance_m[lane].is_finite() {
+                let response = curved(value[lane], curve[lane], look.deviation_m[lane]);
+                met.factor[lane] * response * seen[lane]
+            } else {
+                0.0
             }
-            let (deviation_m, short_m) = (
-                look.deviation_m[lane],
-                self.machine.range_m - met.distance_m[lane],
-            );
-            let Bend { value, curve, .. } = bends[lane];
-            met.factor[lane] * curved(value, curve, deviation_m) * seen_within(short_m, deviation_m).0
         })
     }
 
@@ -210,70 +207,112 @@ impl Apparatus<'_> {
         self.places(&look.rays, &look.hits)
     }
 
-    /// Adds one ray's share: of the reading, or of the shortfall from the range where a sensor averages distances.
+    /// Adds the share of eight rays in the readings.
     #[inline]
-    fn add_ray(&self, outlook: &mut Outlook, lane: usize, weight: f64, glance: Glance) {
-        let Glance {
-            distance_m,
-            slope,
-            deviation_m,
-            factor,
-            bend,
-        } = glance;
-        let short_m = self.machine.range_m - distance_m;
-        if short_m < -4.0 * deviation_m {
-            return;
+    fn add_responses(&self, total: &mut Total, weight: f64, met: &Met, doubt: &Doubt) {
+        let Bends { value, rise, curve } = bends(&self.machine.response, &met.distance_m);
+        let InRange { seen, density } = self.in_range(met, &doubt.deviation_m);
+        for lane in 0..LANES {
+            let (value, seen, density) = (value[lane], seen[lane], density[lane]);
+            let deviation_m = doubt.deviation_m[lane];
+            let share = weight * met.factor[lane];
+            let edge = density * deviation_m;
+            let spread = seen * (1.0 - seen) - edge * edge;
+            let most = share * value;
+            total.edge_variance[lane] += most * most * spread.max(0.0);
+            total.mean[lane] += share * seen * curved(value, curve[lane], deviation_m);
+            let rise = share * (seen * rise[lane] - density * value);
+            for axis in 0..3 {
+                total.slope[axis][lane] += rise * doubt.slope[axis][lane];
+            }
         }
-        if self.machine.beam.combine == Combine::Distances {
-            outlook.mean[lane] += weight * short_m;
-            (0..3).for_each(|axis| outlook.slope[lane][axis] -= weight * slope[axis]);
-            return;
-        }
-        let Bend { value, rise, curve } = bend;
-        let (seen, edge) = seen_within(short_m, deviation_m);
-        let spread = seen * (1.0 - seen) - (edge * deviation_m).powi(2);
-        outlook.edge_variance[lane] += (weight * factor * value).powi(2) * spread.max(0.0);
-        outlook.mean[lane] += weight * factor * seen * curved(value, curve, deviation_m);
-        for axis in 0..3 {
-            outlook.slope[lane][axis] += weight * factor * (seen * rise - edge * value) * slope[axis];
+    }
+
+    /// Adds the share of eight rays in the shortfall from the range of sensors that average distances.
+    fn add_shortfalls(&self, total: &mut Total, weight: f64, met: &Met, doubt: &Doubt) {
+        for lane in 0..LANES {
+            let short_m = self.machine.range_m - met.distance_m[lane];
+            if short_m >= -SURE * doubt.deviation_m[lane] {
+                total.mean[lane] += weight * short_m;
+                total.factor[lane] += weight * (met.factor[lane] - 1.0);
+                for axis in 0..3 {
+                    total.slope[axis][lane] -= weight * doubt.slope[axis][lane];
+                }
+            }
         }
     }
 
     /// From the mean shortfall of the distances to the response at the mean distance.
-    fn respond_to_mean_distance(&self, outlook: &mut Outlook) {
+    fn respond_to_mean_distance(&self, total: &mut Total) {
+        let distance_m = total.mean.map(|short_m| self.machine.range_m - short_m);
+        let Bends { value, rise, .. } = bends(&self.machine.response, &distance_m);
         for lane in 0..LANES {
-            let short_m = outlook.mean[lane];
-            let Bend { value, rise, .. } = bend(&self.machine.response, self.machine.range_m - short_m);
-            let seen = if short_m > 1e-12 { 1.0 } else { 0.0 };
-            outlook.mean[lane] = seen * value;
-            outlook.slope[lane] = outlook.slope[lane].map(|slope| -seen * rise * slope);
+            let factor = if total.mean[lane] > 1e-12 {
+                1.0 + total.factor[lane]
+            } else {
+                0.0
+            };
+            total.mean[lane] = factor * value[lane];
+            for axis in 0..3 {
+                total.slope[axis][lane] *= -factor * rise[lane];
+            }
         }
     }
 
-    /// Change of a ray's distance with x, y and heading, while it stays on its segment.
+    /// Probabilities that uncertain distances are within the range, and their densities there.
     #[inline]
-    fn distance_slope(&self, pose: Pose, rays: &Rays, hits: &Hits, lane: usize) -> [f64; 3] {
-        let direction = rays.direction(lane);
-        let normal = self.geometry.walls.normal(hits.segment[lane] as usize);
-        let towards = not_grazing(normal.dot(direction));
-        let swept = (rays.origin(lane) - pose.position).perp() + direction.perp() * hits.distance_m[lane];
-        [
-            -normal.x / towards,
-            -normal.y / towards,
-            -normal.dot(swept) / towards,
-        ]
+    fn in_range(&self, met: &Met, deviation_m: &[f64; LANES]) -> InRange {
+        let short_m = met.distance_m.map(|distance_m| self.machine.range_m - distance_m);
+        let mut in_range = InRange {
+            seen: short_m.map(|short_m| if short_m >= 0.0 { 1.0 } else { 0.0 }),
+            density: [0.0; LANES],
+        };
+        for lane in 0..LANES {
+            if short_m[lane].abs() < SURE * deviation_m[lane] {
+                let z = short_m[lane] / deviation_m[lane];
+                in_range.seen[lane] = normal_cdf(z);
+                in_range.density[lane] = normal_pdf(z) / deviation_m[lane];
+            }
+        }
+        in_range
+    }
+
+    /// How distances change with x, y and heading, while the rays stay on their segments; nothing where there is no wall.
+    #[inline]
+    fn doubt(&self, pose: Pose, covariance: &PoseMatrix, rays: &Rays, hits: &Hits) -> Doubt {
+        let walls = &self.geometry.walls;
+        let normals = hits.segment.map(|segment| walls.normal(segment as usize));
+        let (normal_x, normal_y) = (normals.map(|n| n.x), normals.map(|n| n.y));
+        let met = hits.distance_m.map(|d| if d < f64::INFINITY { 1.0 } else { 0.0 });
+        let distance_m = hits.distance_m.map(|d| if d < f64::INFINITY { d } else { 0.0 });
+        let mut doubt = Doubt {
+            slope: [[0.0; LANES]; 3],
+            deviation_m: [0.0; LANES],
+        };
+        for lane in 0..LANES {
+            let (x, y) = (rays.direction_x[lane], rays.direction_y[lane]);
+            let per_m = -met[lane] / not_grazing(normal_x[lane] * x + normal_y[lane] * y);
+            let end_x = rays.origin_x[lane] - pose.position.x + x * distance_m[lane];
+            let end_y = rays.origin_y[lane] - pose.position.y + y * distance_m[lane];
+            doubt.slope[0][lane] = normal_x[lane] * per_m;
+            doubt.slope[1][lane] = normal_y[lane] * per_m;
+            doubt.slope[2][lane] = (normal_y[lane] * end_x - normal_x[lane] * end_y) * per_m;
+        }
+        let [of_x, of_y, of_heading] = &doubt.slope;
+        for lane in 0..LANES {
+            let slope = [of_x[lane], of_y[lane], of_heading[lane]];
+            doubt.deviation_m[lane] = quadratic(covariance, slope).max(0.0).sqrt();
+        }
+        doubt
     }
 }
 
 impl Default for Look {
     /// No wall anywhere.
     fn default() -> Self {
-        let rays = Rays::new([(track::Vec2::ZERO, track::Vec2::X); LANES]);
-        let distance_m = [f64::INFINITY; LANES];
         Self {
-            distance_m,
             deviation_m: [0.0; LANES],
-            rays,
+            rays: Rays::new([(track::Vec2::ZERO, track::Vec2::X); LANES]),
             hits: Hits::NONE,
             factor: [1.0; LANES],
             response: [0.0; LANES],
@@ -282,6 +321,11 @@ impl Default for Look {
 }
 
 impl Look {
+    /// Distance along each sensor's axis, m; infinite where there is no wall.
+    pub fn distance_m(&self) -> &[f64; LANES] {
+        &self.hits.distance_m
+    }
+
     /// Responses before effects on readings, counts.
     pub(crate) fn response(&self) -> Readings {
         self.response
@@ -289,7 +333,7 @@ impl Look {
 }
 
 /// A ray that grazes a wall has no useful slope.
-#[inline]
+#[inline(always)]
 fn not_grazing(towards: f64) -> f64 {
     const GRAZING: f64 = 0.05;
     if towards.abs() < GRAZING {
@@ -301,67 +345,47 @@ fn not_grazing(towards: f64) -> f64 {
 
 /// Expectation of a response that bends, over the distance's uncertainty; where it bends more than a parabola can
 /// follow, no more than half of itself.
-#[inline]
+#[inline(always)]
 fn curved(value: f64, bend: f64, deviation_m: f64) -> f64 {
     let most = 0.5 * value.abs();
-    value + (0.5 * bend * deviation_m * deviation_m).clamp(-most, most)
-}
-
-/// Probability that an uncertain distance is within the range, and its density there (1/m).
-#[inline]
-fn seen_within(short_m: f64, deviation_m: f64) -> (f64, f64) {
-    if short_m.abs() >= 4.0 * deviation_m {
-        return (if short_m >= 0.0 { 1.0 } else { 0.0 }, 0.0);
-    }
-    let z = short_m / deviation_m;
-    (normal_cdf(z), normal_pdf(z) / deviation_m)
+    value + (0.5 * bend * deviation_m * deviation_m).max(-most).min(most)
 }
 
 /// s^T M s.
-#[inline]
-fn quadratic(m: &PoseMatrix, s: [f64; 3]) -> f64 {
-    (0..3)
-        .map(|i| s[i] * (m[i][0] * s[0] + m[i][1] * s[1] + m[i][2] * s[2]))
-        .sum()
-}
-
-/// A response at eight distances, computed together; meaningless where a distance is infinite.
-#[inline]
-fn bends(response: &Response, distance_m: &[f64; LANES]) -> [Bend; LANES] {
-    let values = response.readings(distance_m);
-    std::array::from_fn(|lane| bend_at(response, distance_m[lane], values[lane]))
-}
-
-#[inline]
-fn bend(response: &Response, distance_m: f64) -> Bend {
-    bend_at(response, distance_m, response.reading(distance_m))
-}
-
-/// A response at a distance where it has this value.
 #[inline(always)]
-fn bend_at(response: &Response, distance_m: f64, value: f64) -> Bend {
-    match *response {
-        Response::Improved {
-            a_counts, exponent, ..
-        } if distance_m > 0.0 => {
-            let share = 1.0 - value / a_counts;
-            let rate = exponent / distance_m;
-            Bend {
-                value,
-                rise: -rate * value * share,
-                curve: rate / distance_m * value * share * (1.0 + exponent * (2.0 * share - 1.0)),
-            }
-        }
-        _ => {
-            const H_M: f64 = 1e-4;
-            let [low, high] = [-H_M, H_M].map(|h| response.reading((distance_m + h).max(0.0)));
-            Bend {
-                value,
-                rise: (high - low) / (2.0 * H_M),
-                curve: 0.0,
-            }
+fn quadratic(m: &PoseMatrix, s: [f64; 3]) -> f64 {
+    let row = |i: usize| s[i] * (m[i][0] * s[0] + m[i][1] * s[1] + m[i][2] * s[2]);
+    row(0) + row(1) + row(2)
+}
+
+/// A response at eight distances; meaningless where one is infinite.
+#[inline]
+fn bends(response: &Response, distance_m: &[f64; LANES]) -> Bends {
+    let value = response.readings(distance_m);
+    let mut bends = Bends {
+        value,
+        rise: [0.0; LANES],
+        curve: [0.0; LANES],
+    };
+    let has_formula = |lane: usize| matches!(response, Response::Improved { .. }) && distance_m[lane] > 0.0;
+    if let Response::Improved {
+        a_counts, exponent, ..
+    } = *response
+    {
+        for lane in 0..LANES {
+            let share = 1.0 - value[lane] / a_counts;
+            let rate = exponent / distance_m[lane];
+            bends.rise[lane] = -rate * value[lane] * share;
+            bends.curve[lane] =
+                rate / distance_m[lane] * value[lane] * share * (1.0 + exponent * (2.0 * share - 1.0));
         }
     }
+    for lane in (0..LANES).filter(|&lane| !has_formula(lane)) {
+        const H_M: f64 = 1e-4;
+        let [low, high] = [-H_M, H_M].map(|h| response.reading((distance_m[lane] + h).max(0.0)));
+        (bends.rise[lane], bends.curve[lane]) = ((high - low) / (2.0 * H_M), 0.0);
+    }
+    bends
 }
 
 fn normal_pdf(z: f64) -> f64 {
@@ -376,4 +400,77 @@ fn normal_cdf(z: f64) -> f64 {
             + t * (-0.356_563_782 + t * (1.781_477_937 + t * (-1.821_255_978 + t * 1.330_274_429))));
     let upper = normal_pdf(z) * tail;
     if z >= 0.0 { 1.0 - upper } else { upper }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::effects::testing::{scene, silent, steps, with};
+    use crate::{Beam, Combine, Forecast, Model};
+
+    fn seeing(model: &Model, rays: usize, combine: Combine) -> Model {
+        let mut model = model.clone();
+        model.machine.beam = Beam::cone(rays, 0.2, combine).unwrap();
+        model
+    }
+
+    #[test]
+    fn at_a_pose_that_is_known_a_robot_without_noise_reads_what_is_expected() {
+        let plain = silent();
+        let models = [
+            with(&plain, "outer-wall-reflectance", &[0.7]),
+            with(&plain, "incidence-falloff", &[0.8]),
+            plain,
+        ];
+        for (model, rays) in models.iter().flat_map(|model| [(model, 1), (model, 5)]) {
+            for combine in [Combine::Responses, Combine::Distances] {
+                let model = seeing(model, rays, combine);
+                let world = scene().world(&model, 0).unwrap();
+                let mut forecast = Forecast::new(&world).unwrap();
+                let mut seen = 0;
+                for (pose, step) in steps(&model, 0, 3, 400) {
+                    let expected = forecast.readings(pose, &[[0.0; 3]; 3]).mean;
+                    for (expected, read) in expected.iter().zip(step.readings) {
+                        let read_too = expected.min(model.machine.full_scale_counts);
+                        assert!(
+                            (read_too - read).abs() < 1e-9 * (1.0 + read),
+                            "{combine:?} {rays}: {read_too} {read}"
+                        );
+                        seen += usize::from(read > 0.0);
+                    }
+                }
+                assert!(seen > 1000);
+            }
+        }
+    }
+
+    #[test]
+    fn expected_readings_change_with_the_pose_as_their_slopes_say() {
+        const H: f64 = 1e-7;
+        let model = with(&silent(), "inner-wall-reflectance", &[0.8]);
+        for (rays, combine) in [
+            (1, Combine::Responses),
+            (5, Combine::Responses),
+            (5, Combine::Distances),
+        ] {
+            let model = seeing(&model, rays, combine);
+            let world = scene().world(&model, 0).unwrap();
+            let mut forecast = Forecast::new(&world).unwrap();
+            let mut readings = |pose| forecast.readings(pose, &[[0.0; 3]; 3]);
+            let (mut told, mut kinks) = (0, 0);
+            for (pose, _) in steps(&model, 0, 4, 400).into_iter().step_by(7) {
+                let here = readings(pose);
+                let mut ahead = pose;
+                ahead.position.x += H;
+                let there = readings(ahead).mean;
+                for lane in 0..8 {
+                    let change = (there[lane] - here.mean[lane]) / H;
+                    // A ray that leaves its segment in between, or the range, jumps.
+                    let close = (change - here.slope[lane][0]).abs() < 1e-3 * (1.0 + change.abs());
+                    told += usize::from(close && change != 0.0);
+                    kinks += usize::from(!close);
+                }
+            }
+            assert!(told > 100 && kinks * 50 < told, "{told} {kinks}");
+        }
+    }
 }

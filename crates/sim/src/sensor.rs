@@ -272,10 +272,7 @@ impl Beam {
             std::f64::consts::FRAC_PI_2,
         )?;
         if count == 1 || half_angle_rad == 0.0 {
-            return Ok(Self {
-                combine,
-                ..Self::single()
-            });
+            return Ok(Self::single());
         }
         let share = |i: usize| (2.0 * i as f64 + 1.0) / count as f64 - 1.0; // in (-1, 1)
         let weight = |i: usize| (std::f64::consts::FRAC_PI_2 * share(i)).cos();

@@ -459,7 +459,7 @@ pub(crate) fn clear_readings(world: &World<'_>, trace: &Trace, rows: &[LogRow]) 
             let turned = [-SILHOUETTE_RAD, SILHOUETTE_RAD].map(|by| distances_from([0.0, 0.0, by]));
             let about = ABOUT.map(distances_from);
             for lane in 0..8 {
-                let at = instant.look.distance_m[lane];
+                let at = instant.look.distance_m()[lane];
                 let edge = (at - range_m).abs() < EDGE_M + 2.0 * instant.look.deviation_m[lane];
                 // A ray that hits nothing has no such deviation.
                 let missed = at >= range_m && about.iter().any(|side| side[lane] < range_m);
