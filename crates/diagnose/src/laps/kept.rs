@@ -123,53 +123,12 @@ impl Trial<'_> {
 mod tests {
     use std::sync::atomic::AtomicU64;
 
-    use sim::Pattern;
+    use sim::Vec2;
 
     use super::*;
+    use crate::Beginning;
     use crate::laps::atlas::{Atlas, Extent, NULL_SETS};
-    use crate::{ObservedLap, ObservedRun};
-
-    const GATES: usize = 40;
-
-    /// Two runs of laps that scatter by 1 mm, where a wheel scale puts them aside by as many mm, from a hundred on by other draws, and a
-    /// thousand stops the robot.
-    fn simulated(effects: &[Setting], set: u64, extent: Extent) -> Option<Vec<ObservedRun>> {
-        let aside_mm = effects.first().map_or(0.0, |effect| match &effect.pattern {
-            Pattern::Constant(values) => values[0],
-            _ => unreachable!(),
-        });
-        let run = |run: u64| {
-            let purpose = if aside_mm < 100.0 { "laps" } else { "other laps" };
-            let mut stream = sim::Streams { seed: set, run }.open(purpose);
-            let mut lap = |number: usize| {
-                let mut time_s = 60.0 * number as f64;
-                let times_s: Vec<f64> = (0..=GATES)
-                    .map(|_| {
-                        time_s += 1.0 + 0.01 * stream.normal();
-                        time_s
-                    })
-                    .collect();
-                let offsets_m = (0..GATES).map(|_| 1e-3 * (aside_mm + stream.normal()));
-                let smooth = track::Lap {
-                    offsets_m: offsets_m.collect(),
-                    start_s: times_s[0],
-                    end_s: times_s[GATES],
-                    times_s: times_s[..GATES].to_vec(),
-                    missed: Vec::new(),
-                };
-                let mut seen = smooth.clone();
-                (seen.offsets_m.iter_mut()).for_each(|offset_m| *offset_m += 1e-3 * stream.normal());
-                ObservedLap { seen, smooth }
-            };
-            ObservedRun {
-                laps: (0..5).map(&mut lap).collect(),
-                beginning: None,
-                before: Vec::new(),
-            }
-        };
-        let runs = extent.runs(2) as u64;
-        (aside_mm < 1000.0).then(|| (0..runs).map(run).collect())
-    }
+    use crate::laps::testing::simulated;
 
     #[test]
     fn what_a_trace_asks_for_is_simulated_once_and_counts_each_time() {
@@ -233,6 +192,38 @@ mod tests {
         for mean in &found.0[0].means {
             assert!((mean - &first).amax() < 1e-9);
         }
+    }
+
+    #[test]
+    fn first_runs_do_not_stand_for_others_whose_beginning_alone_is_known() {
+        let second_begins = |effects: &[Setting], set: u64, extent: Extent| {
+            let mut runs = simulated(effects, set, extent)?;
+            let mut stream = sim::Streams { seed: set, run: 1 }.open("beginning");
+            if let Some(second) = runs.get_mut(1) {
+                let path: Vec<(f64, Vec2)> = (0..32)
+                    .map(|step| {
+                        (
+                            0.064 * f64::from(step),
+                            0.006 * f64::from(step) + 1e-3 * stream.normal(),
+                        )
+                    })
+                    .map(|(time_s, x_m)| (time_s, Vec2::new(x_m, 0.0)))
+                    .collect();
+                second.beginning = Beginning::of(&path);
+            }
+            Some(runs)
+        };
+        let made = Atlas::without_effects(&second_begins, &[], true, &|| ()).unwrap();
+        let trial = Trial {
+            atlas: &made,
+            simulate: &second_begins,
+            data: &made.null,
+            silent: &[],
+            spent: &made.spent,
+        };
+        let aside = [Setting::constant(sim::find("wheel-scale").unwrap(), [2.0])];
+        let found = trial.simulated_by(&aside, &Draws::FirstRuns(7)).unwrap();
+        assert_eq!(made.white(&found, &made.null).len(), made.layout.len());
     }
 
     #[test]

@@ -17,8 +17,8 @@ use super::summary::SECOND;
 pub(super) struct Layout {
     /// Laps of each run, recording by recording.
     pub(super) laps: Vec<Vec<usize>>,
-    /// Whether it is known how any run of a recording begins.
-    pub(super) begins: Vec<bool>,
+    /// Whether it is known how each run begins, recording by recording.
+    pub(super) begins: Vec<Vec<bool>>,
     /// Entries of one lap.
     pub(super) lap: usize,
 }
@@ -28,7 +28,7 @@ impl Layout {
     pub(super) fn of_recording(runs: &[ObservedRun], lap: usize) -> Self {
         Self {
             laps: vec![runs.iter().map(|run| run.laps.len()).collect()],
-            begins: vec![runs.iter().any(|run| run.beginning.is_some())],
+            begins: vec![runs.iter().map(|run| run.beginning.is_some()).collect()],
             lap,
         }
     }
@@ -97,7 +97,18 @@ impl Layout {
     /// Entries that say how runs of a recording begin.
     pub(super) fn beginning(&self, recording: usize) -> Range<usize> {
         let start = self.noise(recording).end;
-        start..start + if self.begins[recording] { BEGINNING } else { 0 }
+        start..start + if self.is_begun(recording) { BEGINNING } else { 0 }
+    }
+
+    /// Whether it is known how any run of a recording begins.
+    pub(super) fn is_begun(&self, recording: usize) -> bool {
+        self.begins[recording].contains(&true)
+    }
+
+    /// Whether the first run of every recording tells as much as all its runs: how it begins too, if that is known of any.
+    pub(super) fn first_runs_tell_all(&self) -> bool {
+        let tells = |(recording, begins): (usize, &Vec<bool>)| begins[0] == self.is_begun(recording);
+        self.begins.iter().enumerate().all(tells)
     }
 
     /// Entries of a recording's numbers that are no mean laps: both of these.
@@ -108,7 +119,7 @@ impl Layout {
     fn recording_start(&self, recording: usize) -> usize {
         recording
             .checked_sub(1)
-            .map_or(0, |before| self.second(before).end)
+            .map_or(0, |before| self.beginning(before).end)
     }
 }
 
@@ -126,7 +137,7 @@ mod tests {
     fn entries_of_two_recordings_follow_each_other_without_a_gap() {
         let layout = Layout {
             laps: vec![vec![5, 5], vec![7]],
-            begins: vec![true, false],
+            begins: vec![vec![false, true], vec![false]],
             lap: 12,
         };
         let mut all: Vec<usize> = Vec::new();
@@ -140,6 +151,20 @@ mod tests {
         all.extend(layout.second(1));
         assert_eq!(all, (0..layout.len()).collect::<Vec<_>>());
         assert_eq!((layout.runs(), layout.total_laps()), (3, 17));
+        // How the first recording begins only its second run tells.
+        assert_eq!(layout.beginning(0).len(), BEGINNING);
+        assert!(!layout.first_runs_tell_all());
+    }
+
+    #[test]
+    fn entries_of_many_recordings_are_found_at_once() {
+        const MANY: usize = 64;
+        let layout = Layout {
+            laps: vec![vec![5]; MANY],
+            begins: vec![vec![true]; MANY],
+            lap: 12,
+        };
+        assert_eq!(layout.len(), MANY * (2 * 12 + SECOND + BEGINNING));
     }
 
     #[test]

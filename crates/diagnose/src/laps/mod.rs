@@ -6,6 +6,8 @@ mod expectation;
 mod layout;
 mod observed;
 mod summary;
+#[cfg(test)]
+mod testing;
 mod tests_of_fit;
 mod unseen;
 

@@ -121,7 +121,7 @@ impl Trial<'_> {
     /// would hide it.
     fn rough_draws(&self, hypothesis: &Hypothesis, left: f64) -> Option<[Draws; 2]> {
         const ENOUGH: f64 = 0.8;
-        let of_first_runs = self.atlas.are_alike(&hypothesis.settings(self.atlas));
+        let of_first_runs = self.first_runs_tell_all(&hypothesis.settings(self.atlas));
         (of_first_runs && left > ENOUGH).then_some([Draws::FirstRuns(0), Draws::FirstRuns(1)])
     }
 
@@ -439,7 +439,7 @@ impl Search<'_> {
                 hunts.extend(self.hunts_beside(rest, std::iter::once(probe)));
             }
         }
-        if found[0].explanation.share <= verdict::MOST {
+        if (found.first()).is_some_and(|best| best.explanation.share <= verdict::MOST) {
             for base in self.single_bases(found) {
                 hunts.extend(self.hunts_beside(base, self.jumping()));
             }

@@ -81,11 +81,16 @@ impl Trial<'_> {
         Some(Expectation::of(summaries.iter(), self.atlas.alike))
     }
 
+    /// Whether the first run of every recording tells what all runs do that are driven with these settings.
+    pub(super) fn first_runs_tell_all(&self, settings: &[Setting]) -> bool {
+        self.atlas.are_alike(settings) && self.atlas.layout.first_runs_tell_all()
+    }
+
     /// What these draws tell of settings.
     pub(super) fn simulated_by(&self, settings: &[Setting], draws: &Draws) -> Option<Expectation> {
         match draws {
             Draws::Sets(sets) => self.simulated_briefly(settings, sets.clone()),
-            Draws::FirstRuns(set) if self.atlas.are_alike(settings) => {
+            Draws::FirstRuns(set) if self.first_runs_tell_all(settings) => {
                 self.spend(1, Extent::FirstRuns);
                 let summary = self
                     .atlas

@@ -104,7 +104,7 @@ impl Departures {
             noise: Quadratic::of_estimated(each(&|g| layout.noise(g)), recordings, SECOND),
             start: Quadratic::of_estimated(
                 each(&|g| layout.beginning(g)),
-                layout.begins.iter().filter(|begins| **begins).count(),
+                (0..recordings).filter(|&g| layout.is_begun(g)).count(),
                 BEGINNING,
             ),
         }
