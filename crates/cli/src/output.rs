@@ -52,15 +52,16 @@ pub(crate) struct OutDir {
 
 impl OutDir {
     /// The folder in the making for `dir`, empty, or with `resume` what an earlier run of the same
-    /// work left in `DIR.partial`.
+    /// work left in `DIR.partial`; what is made depends on `inputs`.
     ///
     /// # Errors
-    /// `dir` is a file or a folder with anything but our results; `DIR.partial` is not ours, in
-    /// use, or with `resume` of other work; the place cannot be written to.
-    pub(crate) fn create(dir: &Path, work: &Work, resume: bool) -> Result<Self> {
+    /// `dir` is a file or a folder with anything but our results, or holds an input; `DIR.partial` is
+    /// not ours, in use, or with `resume` of other work; the place cannot be written to.
+    pub(crate) fn create(dir: &Path, work: &Work, inputs: &[Input], resume: bool) -> Result<Self> {
         let (partial, replaced) = (beside(dir, ".partial")?, beside(dir, ".replaced")?);
         recover(dir, &replaced)?;
         refuse_foreign(dir)?;
+        refuse_inputs(dir, inputs)?;
         // An empty one is what a run left that was killed as it cleared up.
         let there = partial.symlink_metadata().is_ok() && fs::remove_dir(&partial).is_err();
         let lock = there.then(|| lock_ours(&partial)).transpose()?;
@@ -134,7 +135,9 @@ impl OutDir {
     /// # Errors
     /// The manifest cannot be written, or the folder not renamed; an earlier one then stands again.
     pub(crate) fn finish(mut self, manifest: &Manifest) -> Result<()> {
-        self.write(MANIFEST, manifest.to_json())?;
+        let files =
+            files_in(&self.partial).with_context(|| format!("cannot read {}", self.partial.display()))?;
+        self.write(MANIFEST, manifest.to_json(&files))?;
         refuse_foreign(&self.dir)?;
         let replaced = beside(&self.dir, ".replaced")?;
         let rename = |from: &Path, to: &Path| {
@@ -235,14 +238,63 @@ fn refuse_foreign(dir: &Path) -> Result<()> {
     if !dir.is_dir() {
         bail!("{shown} is there and is not a folder; name another with --out, or move it away");
     }
-    let mut entries = fs::read_dir(dir).with_context(|| format!("cannot read {shown}"))?;
+    let cannot_read = || format!("cannot read {shown}");
+    let mut entries = fs::read_dir(dir).with_context(cannot_read)?;
     if entries.next().is_some() && !is_ours(dir) {
         bail!(
             "{shown} is there and holds no manifest.json of lapwing, so it is not replaced; \
              name another folder with --out, or move it away"
         );
     }
+    let manifest = fs::read(dir.join(MANIFEST)).unwrap_or_default();
+    if let Some(written) = Manifest::files(&manifest) {
+        let found = files_in(dir).with_context(cannot_read)?;
+        if let Some(other) = found.iter().find(|file| !written.contains(file)) {
+            bail!(
+                "{shown} holds {other}, which lapwing did not write, so it is not replaced; \
+                 move that file away, or name another folder with --out"
+            );
+        }
+    }
     Ok(())
+}
+
+/// A folder that is replaced must hold nothing that the results are made from.
+fn refuse_inputs(dir: &Path, inputs: &[Input]) -> Result<()> {
+    let Ok(whole) = dir.canonicalize() else {
+        return Ok(());
+    };
+    // What is embedded is no file.
+    let lies_within =
+        |input: &&Input| fs::canonicalize(&input.path).is_ok_and(|input| input.starts_with(&whole));
+    if let Some(input) = inputs.iter().find(lies_within) {
+        bail!(
+            "{} lies in {}, which would be replaced; name another folder with --out",
+            input.path,
+            dir.display()
+        );
+    }
+    Ok(())
+}
+
+/// The files in a folder and below it, but for the manifest and the marker, in order; names with `/`.
+fn files_in(dir: &Path) -> std::io::Result<Vec<String>> {
+    fn walk(dir: &Path, below: &str, files: &mut Vec<String>) -> std::io::Result<()> {
+        for entry in fs::read_dir(dir)? {
+            let entry = entry?;
+            let name = format!("{below}{}", entry.file_name().to_string_lossy());
+            if entry.file_type()?.is_dir() {
+                walk(&entry.path(), &format!("{name}/"), files)?;
+            } else if name != MANIFEST && name != MARKER {
+                files.push(name);
+            }
+        }
+        Ok(())
+    }
+    let mut files = Vec::new();
+    walk(dir, "", &mut files)?;
+    files.sort();
+    Ok(files)
 }
 
 fn is_ours(dir: &Path) -> bool {

@@ -56,7 +56,7 @@ fn write(
 ) -> Result<()> {
     let Bench::Rays { segments, seeds, .. } = args;
     let configuration = json!({ "segments": segments, "seeds": seeds, "seed": session.seed() });
-    let folder = OutDir::create(out, &Work::new("bench rays", &configuration), false)?;
+    let folder = OutDir::create(out, &Work::new("bench rays", &configuration), &[], false)?;
     folder.write("rays_timing.json", format!("{document:#}\n"))?;
     folder.write("rays_timing.svg", ray_study::figure(rows, rungs).to_svg()?)?;
     folder.write("ladder.csv", ray_study::ladder_table(rungs).to_csv())?;

@@ -33,7 +33,12 @@ pub(crate) fn run(session: &Session, args: &Compare) -> Result<()> {
     if let Some(out) = &args.out {
         let configuration =
             json!({ "data": args.data, "modes": args.modes, "permutations": args.permutations });
-        let folder = OutDir::create(out, &Work::new("compare", &configuration), false)?;
+        let folder = OutDir::create(
+            out,
+            &Work::new("compare", &configuration),
+            &clusters.inputs,
+            false,
+        )?;
         folder.write("compare.json", format!("{document:#}\n"))?;
         folder.write("pairs.csv", pairs_csv(&document))?;
         if pdm.degrees_of_freedom() >= 2 {

@@ -26,9 +26,10 @@ pub(crate) fn run(session: &Session, args: &args::Drive) -> Result<()> {
         "model": file.config, "seed": session.seed(), "runs": args.runs, "laps": args.laps, "log": args.log,
         "caster": setup.scene.caster().kind().name(),
     });
-    let out = OutDir::create(&args.out, &Work::new("drive", &configuration), false)?;
-    let (runs, laps) = (args.runs as usize, args.laps as usize);
     let source = file.world(world)?;
+    let inputs = vec![file.input.clone(), source.input.clone()];
+    let out = OutDir::create(&args.out, &Work::new("drive", &configuration), &inputs, false)?;
+    let (runs, laps) = (args.runs as usize, args.laps as usize);
     let progress = session.progress("driving", u64::from(args.runs));
     let driven: Vec<(Drive, Rows)> = (0..runs)
         .into_par_iter()
@@ -83,7 +84,7 @@ pub(crate) fn run(session: &Session, args: &args::Drive) -> Result<()> {
     )?;
     let document = summary(&name, &sampled, &driven);
     out.write("summary.json", format!("{document:#}\n"))?;
-    out.finish(&session.manifest(configuration, vec![file.input.clone(), source.input]))?;
+    out.finish(&session.manifest(configuration, inputs))?;
 
     for remark in sampled.iter().flat_map(SampledRun::remarks) {
         session.remark(&remark);

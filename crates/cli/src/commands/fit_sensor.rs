@@ -18,7 +18,12 @@ pub(crate) fn run(session: &Session, args: &FitSensor) -> Result<()> {
     let fit = ResponseFit::new(&pairs).with_context(|| args.pairs.display().to_string())?;
     if let Some(out) = &args.out {
         let configuration = json!({ "pairs": args.pairs, "columns": names });
-        let out = OutDir::create(out, &Work::new("fit-sensor", &configuration), false)?;
+        let out = OutDir::create(
+            out,
+            &Work::new("fit-sensor", &configuration),
+            std::slice::from_ref(&input),
+            false,
+        )?;
         out.write("fit.json", format!("{:#}\n", document(&fit)))?;
         out.write("response.svg", figure(&fit, &names).to_svg()?)?;
         out.finish(&session.manifest(configuration, vec![input]))?;

@@ -38,7 +38,7 @@ pub(crate) fn run(session: &Session, args: &Reproduce) -> Result<()> {
         "standard": measured.standard()?, "rule_based": measured.rule_based()?,
         "seed": session.seed(), "seeds": args.seeds, "trace": !args.no_trace, "inputs": inputs,
     });
-    let folder = OutDir::create(&out, &Work::new("reproduce", &configuration), false)?;
+    let folder = OutDir::create(&out, &Work::new("reproduce", &configuration), &inputs, false)?;
     let draws = args.seeds as usize;
     // A comparison of a draw takes about as long as a run.
     let total = draws * (Study::RUNS_PER_DRAW + EXPERIMENTS.len());

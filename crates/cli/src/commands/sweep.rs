@@ -34,7 +34,12 @@ const UNITS: &str = "units";
 
 pub(crate) fn run(session: &Session, args: &args::Sweep) -> Result<()> {
     let sweep = Sweep::new(session, args)?;
-    let mut out = OutDir::create(&args.out, &Work::new("sweep", &sweep.identity), args.resume)?;
+    let mut out = OutDir::create(
+        &args.out,
+        &Work::new("sweep", &sweep.identity),
+        &sweep.inputs,
+        args.resume,
+    )?;
     out.keep_partial();
     sweep.simulate(session, &out)?;
     let results = sweep.analyse(&out)?;

@@ -25,7 +25,7 @@ pub(crate) fn run(session: &Session, args: &args::Trace) -> Result<()> {
     let configuration = json!({
         "model": file.config, "seed": session.seed(), "measured": args.measured, "held_out": args.held_out, "inputs": inputs,
     });
-    let folder = OutDir::create(&args.out, &Work::new("trace", &configuration), false)?;
+    let folder = OutDir::create(&args.out, &Work::new("trace", &configuration), &inputs, false)?;
     let cache = Cache::new(&args.signatures);
     let world = args.model.settings.world.as_deref();
     let trace = Trace::new(session, &file, world, sets, held_out, &cache)?;

@@ -44,7 +44,12 @@ fn check(session: &Session, source: &WorldSource, json: bool, out: Option<&Path>
     let course = &circuit.course;
     let corridor = course.corridor_m();
     if let Some(out) = out {
-        let folder = OutDir::create(out, &Work::new("world check", &source.text), false)?;
+        let folder = OutDir::create(
+            out,
+            &Work::new("world check", &source.text),
+            std::slice::from_ref(&source.input),
+            false,
+        )?;
         let marks = vec![walls(course), joints(course), gates(&circuit)];
         folder.write(
             "course.svg",
@@ -122,7 +127,12 @@ fn segments(
     let document = json!({ "world": course.name, "approximations": approximations });
     if let Some(out) = out {
         let configuration = json!({ "world": source.label, "max_error_m": max_errors_m });
-        let folder = OutDir::create(out, &Work::new("world segments", &configuration), false)?;
+        let folder = OutDir::create(
+            out,
+            &Work::new("world segments", &configuration),
+            std::slice::from_ref(&source.input),
+            false,
+        )?;
         folder.write("segments.json", format!("{document:#}\n"))?;
         folder.write("segments.svg", segments_figure(&course, max_errors_m)?.to_svg()?)?;
         folder.finish(&session.manifest(configuration, vec![source.input.clone()]))?;

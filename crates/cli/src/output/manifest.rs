@@ -51,8 +51,8 @@ pub(crate) struct Manifest {
 }
 
 impl Manifest {
-    /// The text of `manifest.json`.
-    pub(crate) fn to_json(&self) -> String {
+    /// The text of `manifest.json` beside these files.
+    pub(crate) fn to_json(&self, files: &[String]) -> String {
         let Self {
             command_line,
             seed,
@@ -67,6 +67,7 @@ impl Manifest {
             "seed": seed,
             "configuration": configuration,
             "inputs": inputs,
+            "files": files,
             "duration_s": (duration_s * 1000.0).round() / 1000.0,
         });
         format!("{manifest:#}\n")
@@ -76,5 +77,11 @@ impl Manifest {
     pub(crate) fn is_ours(bytes: &[u8]) -> bool {
         serde_json::from_slice::<Value>(bytes)
             .is_ok_and(|manifest| manifest["program"] == PROGRAM && manifest["version"].is_string())
+    }
+
+    /// The files that a manifest of this program lists; `None` if it lists none, as earlier ones do.
+    pub(crate) fn files(bytes: &[u8]) -> Option<Vec<String>> {
+        let manifest: Value = serde_json::from_slice(bytes).ok()?;
+        serde_json::from_value(manifest["files"].clone()).ok()
     }
 }

@@ -29,7 +29,7 @@ fn names(dir: &Path) -> Vec<String> {
 }
 
 fn refusal(dir: &Path, resume: bool) -> String {
-    let error = OutDir::create(dir, &work(0.1), resume).unwrap_err();
+    let error = OutDir::create(dir, &work(0.1), &[], resume).unwrap_err();
     format!("{error:#}")
 }
 
@@ -37,7 +37,7 @@ fn refusal(dir: &Path, resume: bool) -> String {
 fn a_folder_appears_whole() {
     let home = TempDir::new().unwrap();
     let dir = home.path().join("deep/out");
-    let out = OutDir::create(&dir, &work(0.1), false).unwrap();
+    let out = OutDir::create(&dir, &work(0.1), &[], false).unwrap();
     out.write("figures/a.svg", "<svg/>").unwrap();
     out.write("half.json", "{}").unwrap();
     out.remove("half.json").unwrap();
@@ -57,6 +57,7 @@ fn a_folder_appears_whole() {
             "command_line": ["lapwing", "sweep"],
             "seed": 1,
             "configuration": { "slip": 0.1 },
+            "files": ["figures/a.svg"],
             "inputs": [{
                 "path": "model.toml",
                 "sha256": "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad"
@@ -72,7 +73,7 @@ fn ours_and_empty_folders_are_replaced() {
     let dir = home.path().join("out");
     fs::create_dir(&dir).unwrap();
     for file in ["first", "second"] {
-        let out = OutDir::create(&dir, &work(0.1), false).unwrap();
+        let out = OutDir::create(&dir, &work(0.1), &[], false).unwrap();
         out.write(file, file).unwrap();
         out.finish(&manifest()).unwrap();
         let mut expected = [file, "manifest.json"];
@@ -105,7 +106,7 @@ fn an_empty_partial_folder_is_what_a_killed_run_left() {
     let home = TempDir::new().unwrap();
     let dir = home.path().join("out");
     fs::create_dir(home.path().join("out.partial")).unwrap();
-    let out = OutDir::create(&dir, &work(0.1), false).unwrap();
+    let out = OutDir::create(&dir, &work(0.1), &[], false).unwrap();
     out.write("deep/a.txt", "a").unwrap();
     drop(out);
     assert!(names(home.path()).is_empty());
@@ -127,17 +128,17 @@ fn a_foreign_partial_folder_is_refused() {
 fn dropped_work_leaves_nothing_unless_kept() {
     let home = TempDir::new().unwrap();
     let dir = home.path().join("out");
-    let out = OutDir::create(&dir, &work(0.1), false).unwrap();
+    let out = OutDir::create(&dir, &work(0.1), &[], false).unwrap();
     out.write("a", "1").unwrap();
     drop(out);
     assert!(names(home.path()).is_empty());
-    let mut out = OutDir::create(&dir, &work(0.1), true).unwrap();
+    let mut out = OutDir::create(&dir, &work(0.1), &[], true).unwrap();
     assert!(!out.resumed());
     out.keep_partial();
     out.write("a", "1").unwrap();
     drop(out);
     assert_eq!(names(home.path()), ["out.partial"]);
-    let resumed = OutDir::create(&dir, &work(0.1), true).unwrap();
+    let resumed = OutDir::create(&dir, &work(0.1), &[], true).unwrap();
     assert!(resumed.resumed());
     assert_eq!(resumed.read("a").unwrap().as_deref(), Some(&b"1"[..]));
     assert_eq!(resumed.read("b").unwrap(), None);
@@ -150,7 +151,7 @@ fn other_work_is_not_resumed_but_removed_when_begun_anew() {
     let home = TempDir::new().unwrap();
     let dir = home.path().join("out");
     let begin = |work: &Work| {
-        let mut out = OutDir::create(&dir, work, false).unwrap();
+        let mut out = OutDir::create(&dir, work, &[], false).unwrap();
         out.keep_partial();
         out.write("a", "1").unwrap();
     };
@@ -163,7 +164,7 @@ fn other_work_is_not_resumed_but_removed_when_begun_anew() {
         home.path().join("out.partial/a").exists(),
         "a refusal removes nothing"
     );
-    let anew = OutDir::create(&dir, &work(0.1), false).unwrap();
+    let anew = OutDir::create(&dir, &work(0.1), &[], false).unwrap();
     assert_eq!(anew.read("a").unwrap(), None);
 }
 
@@ -171,7 +172,7 @@ fn other_work_is_not_resumed_but_removed_when_begun_anew() {
 fn two_runs_do_not_share_a_folder() {
     let home = TempDir::new().unwrap();
     let dir = home.path().join("out");
-    let first = OutDir::create(&dir, &work(0.1), false).unwrap();
+    let first = OutDir::create(&dir, &work(0.1), &[], false).unwrap();
     for resume in [false, true] {
         assert!(refusal(&dir, resume).contains("is in use by another run of lapwing"));
     }
@@ -182,19 +183,19 @@ fn two_runs_do_not_share_a_folder() {
 fn a_run_killed_while_replacing_loses_nothing() {
     let home = TempDir::new().unwrap();
     let (dir, aside) = (home.path().join("out"), home.path().join("out.replaced"));
-    OutDir::create(&dir, &work(0.1), false)
+    OutDir::create(&dir, &work(0.1), &[], false)
         .unwrap()
         .finish(&manifest())
         .unwrap();
     fs::rename(&dir, &aside).unwrap();
-    drop(OutDir::create(&dir, &work(0.1), false).unwrap());
+    drop(OutDir::create(&dir, &work(0.1), &[], false).unwrap());
     assert_eq!(names(home.path()), ["out"]);
 }
 
 #[test]
 fn names_stay_inside() {
     let home = TempDir::new().unwrap();
-    let out = OutDir::create(&home.path().join("out"), &work(0.1), false).unwrap();
+    let out = OutDir::create(&home.path().join("out"), &work(0.1), &[], false).unwrap();
     for name in ["../a", "/a", "", "a/../../b"] {
         let error = out.write(name, "").unwrap_err().to_string();
         assert_eq!(
@@ -208,7 +209,7 @@ fn names_stay_inside() {
 #[test]
 fn a_full_disk_names_file_and_cause_and_leaves_nothing() {
     let home = TempDir::new().unwrap();
-    let out = OutDir::create(&home.path().join("out"), &work(0.1), false).unwrap();
+    let out = OutDir::create(&home.path().join("out"), &work(0.1), &[], false).unwrap();
     std::os::unix::fs::symlink("/dev/full", out.path().join("a.csv.tmp")).unwrap();
     let error = format!("{:#}", out.write("a.csv", "1").unwrap_err());
     assert!(error.starts_with("cannot write ") && error.contains("out.partial/a.csv: No space left"));
@@ -233,4 +234,49 @@ fn a_place_that_cannot_be_written_is_named() {
 fn the_hash_of_work_is_that_of_its_configuration() {
     assert_eq!(work(0.1), work(0.1));
     assert_ne!(work(0.1), work(0.2));
+}
+
+#[test]
+fn a_folder_that_holds_an_input_is_not_replaced() {
+    let home = TempDir::new().unwrap();
+    let dir = home.path().join("laps");
+    let out = OutDir::create(&dir, &work(0.1), &[], false).unwrap();
+    out.write("more/run_a.csv", "t_s").unwrap();
+    out.finish(&manifest()).unwrap();
+    let data = dir.join("more/run_a.csv");
+    let inputs = [
+        Input::of("an embedded file", b""),
+        Input::of(data.to_str().unwrap(), b"t_s"),
+    ];
+    // With or without a way round.
+    for dir in [dir.clone(), dir.join("../laps")] {
+        let refused = OutDir::create(&dir, &work(0.1), &inputs, false).unwrap_err();
+        assert!(format!("{refused}").contains("run_a.csv lies in"), "{refused}");
+    }
+    assert_eq!(fs::read_to_string(&data).unwrap(), "t_s");
+    // A folder within that of the inputs takes nothing from them.
+    drop(OutDir::create(&dir.join("report"), &work(0.1), &inputs, false).unwrap());
+}
+
+#[test]
+fn a_folder_with_a_file_of_its_users_is_not_replaced() {
+    let home = TempDir::new().unwrap();
+    let dir = home.path().join("report");
+    let write = || {
+        let out = OutDir::create(&dir, &work(0.1), &[], false).unwrap();
+        out.write("figures/a.svg", "<svg/>").unwrap();
+        out.finish(&manifest()).unwrap();
+    };
+    write();
+    write();
+    let note = dir.join("figures/note.txt");
+    fs::write(&note, "mine").unwrap();
+    let refused = refusal(&dir, false);
+    assert!(
+        refused.contains("holds figures/note.txt, which lapwing did not write"),
+        "{refused}"
+    );
+    assert_eq!(fs::read_to_string(&note).unwrap(), "mine");
+    fs::remove_file(&note).unwrap();
+    write();
 }
