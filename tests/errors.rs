@@ -222,7 +222,7 @@ fn models_with_keys_or_values_that_are_not_there() {
         ),
         (
             "[[effect]]\nkind = \"reading-gain\"\nby = \"run\"\ngain = [1.1]\n",
-            "model.toml:3: effect.0.by: reading-gain has values by run for 1 of them, and there are more",
+            "model.toml:3: effect.0.by: reading-gain has values by run for 1 of them, and there are more; give as many values, or drive 1",
         ),
         (
             "[sensor]\nrays = 100000000\n",

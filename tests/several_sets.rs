@@ -201,7 +201,7 @@ fn a_log_that_no_controller_gives_is_named() {
     says(&found, "unexplained", &[]);
     let said = found["remarks"][0].as_str().unwrap();
     assert!(
-        said.starts_with("No controller of this kind gives 100.0 % of the logged commands of run set/b from"),
+        said.starts_with("No controller of this kind gives the logged commands of run set/b from the logged readings: 100.0 %"),
         "{said}"
     );
 }
@@ -269,6 +269,6 @@ fn a_model_whose_effect_goes_by_run_has_a_size_for_each_run_of_all_sets() {
     Robot::with(other).logged(&[5; 2]).record(&scratch, "more");
     scratch.refuses(
         &[args.as_slice(), &["out2", "--measured", "more"]].concat(),
-        "lit.toml:4: effect.0.by: directional-light has values by run for 2 of them, and there are more",
+        "lit.toml:4: effect.0.by: directional-light has values by run for 2 of them, and there are more; give as many values, or drive 2",
     );
 }

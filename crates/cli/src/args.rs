@@ -137,9 +137,9 @@ impl Default for Reproduce {
 pub(crate) struct Drive {
     #[command(flatten)]
     pub(crate) model: ModelArgs,
-    /// Number of runs, each from a random start of its own
-    #[arg(long, default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..))]
-    pub(crate) runs: u32,
+    /// Number of runs, each from a random start of its own [default: 4, or as many as the model has values by run]
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..))]
+    pub(crate) runs: Option<u32>,
     /// Whole laps per run after the first, which is dropped
     #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..))]
     pub(crate) laps: u32,

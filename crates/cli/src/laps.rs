@@ -217,7 +217,7 @@ fn sample(set: &DataSet, run: &RunFile, circuit: &Circuit, way: Way) -> Result<S
             );
         }
         bail!(
-            "{path}: {} whole lap{}, and the first is not analysed: at least two are needed; check the world, the \
+            "{path}: {} whole lap{}, and the first is not analysed: at least two are needed, and four to trace; check the world, the \
              driving direction ([declared] run.direction in dataset.toml) and the unit of x_m and y_m",
             whole.len(),
             if whole.len() == 1 { "" } else { "s" }

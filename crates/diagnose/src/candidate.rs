@@ -38,7 +38,7 @@ impl Candidate {
             self.setting.pattern.numbers()[place],
             HALF_WIDTH_95 * self.standard_errors[place],
         );
-        let range = self.param(place).filter(|param| round(param).is_none());
+        let range = self.setting.param(place).filter(|param| round(param).is_none());
         let [low, high] = range.map_or([f64::NEG_INFINITY, f64::INFINITY], |param| {
             [param.low, param.high]
         });
@@ -48,24 +48,12 @@ impl Candidate {
     /// The relative error of its size: the least of its fitted values'.
     pub fn relative_error(&self) -> f64 {
         let of_value = |(place, (value, error)): (usize, (f64, &f64))| {
-            let neutral = self.param(place)?.neutral?;
+            let neutral = self.setting.param(place)?.neutral?;
             (*error > 0.0).then(|| error / (value - neutral).abs().max(1e-12))
         };
         let values = self.setting.pattern.numbers().into_iter();
         let errors = values.zip(&self.standard_errors).enumerate().filter_map(of_value);
         errors.fold(1.0, f64::min)
-    }
-
-    /// The parameter of a value by its place in the order of the pattern's values; `None` of a change per second.
-    fn param(&self, place: usize) -> Option<&'static Param> {
-        let Setting { spec, pattern } = &self.setting;
-        let own = match pattern {
-            Pattern::Constant(_) => place,
-            Pattern::ByRun(_) => place % spec.params.len(),
-            Pattern::ByTime { start, .. } if place >= start.len() => return None,
-            Pattern::ByTime { .. } => place,
-        };
-        spec.param(own)
     }
 
     /// The stage of the loop in which it acts.

@@ -50,6 +50,14 @@ pub enum Error {
         "every run needs at least three whole laps that pass all gates: measure more laps, or leave the run out"
     )]
     TooFewLaps,
+    /// Gates so far apart that a lap is not divided into stretches by them.
+    #[error("{gates} gates are too few to trace by: at least {least} are needed; raise run.gates")]
+    TooFewGates {
+        /// Gates of a lap.
+        gates: usize,
+        /// Gates that are enough.
+        least: usize,
+    },
     /// Runs that are not those that the declared model was simulated for.
     #[error("the declared model was simulated for runs of {expected:?} laps, and these have {found:?}")]
     Shape {

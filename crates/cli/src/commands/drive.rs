@@ -3,7 +3,7 @@
 use anyhow::Result;
 use rayon::prelude::*;
 use serde_json::{Value, json};
-use sim::{CasterKind, Drive, Step, Streams};
+use sim::{CasterKind, Drive, Model, Pattern, Step, Streams};
 use toml::Table as Toml;
 
 use crate::args;
@@ -17,20 +17,33 @@ use crate::session::Session;
 use crate::setup::{self, Setup, locate};
 use crate::table::Table;
 
+/// Runs where nobody says how many: those that the model's effects have values for.
+fn default_runs(model: &Model) -> usize {
+    const USUAL: usize = 4;
+    let by_run = model.effects.iter().filter_map(|effect| match &effect.pattern {
+        Pattern::ByRun(runs) => Some(runs.len()),
+        Pattern::Constant(_) | Pattern::ByTime { .. } => None,
+    });
+    by_run.min().unwrap_or(USUAL)
+}
+
 pub(crate) fn run(session: &Session, args: &args::Drive) -> Result<()> {
     let file = setup::model_file(&args.model)?;
     let world = args.model.settings.world.as_deref();
     let kind = args.caster.as_deref().and_then(caster);
     let setup = Setup::load(&file, world, kind)?;
+    let runs = args
+        .runs
+        .map_or_else(|| default_runs(&setup.model), |runs| runs as usize);
     let configuration = json!({
-        "model": file.config, "seed": session.seed(), "runs": args.runs, "laps": args.laps, "log": args.log,
+        "model": file.config, "seed": session.seed(), "runs": runs, "laps": args.laps, "log": args.log,
         "caster": setup.scene.caster().kind().name(),
     });
     let source = file.world(world)?;
     let inputs = vec![file.input.clone(), source.input.clone()];
     let out = OutDir::create(&args.out, &Work::new("drive", &configuration), &inputs, false)?;
-    let (runs, laps) = (args.runs as usize, args.laps as usize);
-    let progress = session.progress("driving", u64::from(args.runs));
+    let laps = args.laps as usize;
+    let progress = session.progress("driving", runs as u64);
     let driven: Vec<(Drive, Rows)> = (0..runs)
         .into_par_iter()
         .map(|run| {

@@ -7,6 +7,7 @@ use sim::Pattern;
 use super::Trace;
 use super::answer::{FromLogs, rivals};
 use super::errors::Starts;
+use super::limits::CHANNELS;
 use super::next::Experiment;
 
 /// The document of a trace.
@@ -25,7 +26,7 @@ pub(crate) fn document(trace: &Trace) -> Value {
             "metric": "rms over the gates of the difference between the mean lateral position of simulated laps and of a held-out run, m",
             "before": trace.mean_m(|e| &e.before_m), "after": trace.mean_m(|e| &e.after_m),
             "floor": trace.mean_m(|e| &e.floor_m),
-            "held_out": trace.held_out().map(|run| run.name.clone()).collect::<Vec<_>>(),
+            "held_out": if trace.is_judged_by_the_fitted() { Vec::new() } else { trace.held_out().map(|run| run.name.clone()).collect() },
             "start_of_runs": trace.errors.iter().map(|errors| errors.starts.as_ref().map(starts)).collect::<Vec<_>>(),
         },
         "candidates": answer.explanations.iter().map(|e| candidate(e, trace.laps_alone())).collect::<Vec<_>>(),
@@ -79,7 +80,7 @@ fn logs(found: &FromLogs) -> Value {
     json!({
         "decide": { "verdict": decide, "effects": effects, "commands_unexplained": share },
         "p": logs.p, "control_steps": logs.steps,
-        "innovations": logs.channels.iter().map(channel).collect::<Vec<_>>(),
+        "innovations": CHANNELS.iter().zip(&logs.channels).map(channel).collect::<Vec<_>>(),
         "walls_cut_at": { "points_per_span": logs.corners.per_span, "before": logs.corners.before },
         "confirmed_by_laps": found.confirmed,
         "laps_after": found.after.as_ref().map(departures),
@@ -87,9 +88,9 @@ fn logs(found: &FromLogs) -> Value {
 }
 
 /// How white the filter's innovations of one measured number are: 1, 3 and 0 under the model.
-fn channel(channel: &Channel) -> Value {
+fn channel((measured, channel): (&&str, &Channel)) -> Value {
     json!({
-        "count": channel.count, "mean_square": channel.mean_square, "kurtosis": channel.kurtosis,
+        "measured": measured, "count": channel.count, "mean_square": channel.mean_square, "kurtosis": channel.kurtosis,
         "correlation": channel.correlation,
     })
 }

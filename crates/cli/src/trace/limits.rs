@@ -8,6 +8,7 @@ use sim::Param;
 use super::Trace;
 use super::next::{Experiment, MOST_LAPS};
 use super::recording::{Recording, files, runs};
+use crate::dataset::Log;
 use crate::experiments::Block;
 use crate::table::{Table, far_from, probability};
 
@@ -33,14 +34,40 @@ pub(super) fn decide_in_words(decide: &Decided, recordings: &[Recording]) -> Str
                 String::new()
             };
             format!(
-                "No controller of this kind gives {:.1} % of the logged commands{of} from the logged readings: look at the units \
-                 (readings in counts, speeds in m/s), at how they are rounded or cut, at the order of the columns, and at the \
-                 controller.",
-                100.0 * share
+                "No controller of this kind gives the logged commands{of} from the logged readings: {:.1} % of them do not follow from \
+                 any constants.{} Look at the units (readings in counts, speeds in m/s), at how they are rounded or cut, at the order of the \
+                 columns, and at the controller. Without the columns of the log (ps0 to right_m_s) the laps alone are traced.",
+                100.0 * share,
+                too_fast(recordings).unwrap_or_default(),
             )
         }
         Decided::Unknown => "No control step has both readings and commands.".to_owned(),
     }
+}
+
+/// That logged commands are faster than the declared wheels can be, a sentence.
+fn too_fast(recordings: &[Recording]) -> Option<String> {
+    let speeds_m_s = |recording: &Recording| {
+        let logs = recording
+            .measured
+            .set
+            .runs
+            .iter()
+            .filter_map(|run| run.rows.log.as_ref());
+        let of_log = |log: &Log| {
+            log.left_m_s
+                .iter()
+                .chain(&log.right_m_s)
+                .fold(0.0_f64, |most, v| most.max(v.abs()))
+        };
+        logs.map(of_log).fold(0.0_f64, f64::max)
+    };
+    recordings.iter().find_map(|recording| {
+        let (fastest_m_s, limit_m_s) = (speeds_m_s(recording), recording.config.robot.wheel_speed_limit_m_s);
+        (fastest_m_s > 1.5 * limit_m_s).then(|| {
+            format!(" The fastest is {fastest_m_s:.3} m/s, and the declared wheels reach {limit_m_s:.3} m/s (robot.wheel_speed_limit_m_s).")
+        })
+    })
 }
 
 /// The next experiment in a sentence; `None` where nothing has to be told apart.
@@ -110,9 +137,12 @@ pub(super) fn limits(trace: &Trace) -> Vec<Block> {
             unseen.push(format!("{name} ({parameter})"));
             continue;
         }
-        let parameter = match all[0].unit {
-            "" => parameter.to_owned(),
-            unit => format!("{parameter}, {unit}"),
+        let unit = all[0].unit;
+        // Most names end with their unit.
+        let parameter = if parameter.ends_with(&unit.replace('/', "_").replace('^', "")) {
+            parameter.to_owned()
+        } else {
+            format!("{parameter}, {unit}")
         };
         let shown = |side: Option<String>| side.unwrap_or_else(|| "-".to_owned());
         table.push([name.to_owned(), parameter, shown(below), shown(above)]);
@@ -150,13 +180,18 @@ fn range(all: &[&Detectable], of: &dyn Fn(&Detectable) -> Option<f64>, falling: 
     };
     let sized = |p: &&Param| p.name == all[0].parameter;
     let neutral = all[0].spec.params.iter().find(sized).and_then(|p| p.neutral);
-    let shown = |size: &f64| far_from(neutral.unwrap_or(0.0), *size);
-    Some(if sizes.len() == 1 {
-        format!("{}{hidden}", shown(first))
+    let [first, last] = [first, last].map(|size| far_from(neutral.unwrap_or(0.0), *size));
+    Some(if first == last {
+        format!("{first}{hidden}")
     } else {
-        format!("{} to {}{hidden}", shown(first), shown(last))
+        format!("{first} to {last}{hidden}")
     })
 }
+
+/// What is measured in a control step, in the order of a diagnosis' channels.
+pub(super) const CHANNELS: [&str; 10] = [
+    "camera x", "camera y", "S0", "S1", "S2", "S3", "S4", "S5", "S6", "S7",
+];
 
 /// What the robot's log says stage by stage.
 pub(super) fn stages(trace: &Trace) -> Vec<Block> {
@@ -176,10 +211,7 @@ pub(super) fn stages(trace: &Trace) -> Vec<Block> {
         "Innovations of the filter with the best explanation: 1, 3 and 0 if it were the whole truth",
         &["measured", "number", "mean square", "kurtosis", "correlation"],
     );
-    let names = [
-        "camera x", "camera y", "S0", "S1", "S2", "S3", "S4", "S5", "S6", "S7",
-    ];
-    for (name, channel) in names.iter().zip(&logs.channels) {
+    for (name, channel) in CHANNELS.iter().zip(&logs.channels) {
         table.push([
             (*name).to_owned(),
             channel.count.to_string(),

@@ -35,8 +35,8 @@ use limits::decide_in_words;
 use logs::{Logs, unused_in_words};
 use next::{Experiment, experiments};
 pub(crate) use pages::{digest, sections, summary};
-use recording::{HeldOut, Recording};
-use remarks::remarks;
+use recording::{HeldOut, Recording, runs};
+use remarks::{remarks, sizes_by_run_in_words};
 
 use crate::config::{Config, ModelFile};
 use crate::dataset::DataSet;
@@ -62,6 +62,7 @@ pub(crate) struct Trace {
     pub(crate) errors: Vec<Errors>,
     /// What a reader must know of the data.
     pub(crate) remarks: Vec<String>,
+    judged_by_the_fitted: bool,
     /// Experiments that would tell the answer from what these data do not tell it from.
     pub(crate) experiments: Vec<Experiment>,
     /// The smallest sizes of effects that these data show; of laps without logs.
@@ -98,7 +99,8 @@ impl Trace {
             .transpose()?;
         let seed = session.seed();
         let logged = Logs::of(&recordings);
-        let mut remarks = remarks(&recordings, logged.as_ref());
+        let judged_by_the_fitted = held_out.is_none() && runs(&recordings).count() == 1;
+        let mut remarks = remarks(&recordings, logged.as_ref(), held_out.is_some());
         let held_out_runs = held_out.iter().flat_map(|held_out| &held_out.runs);
         remarks.extend(held_out_runs.flat_map(SampledRun::remarks));
         // Logs name the effect, and the laps judge it.
@@ -127,6 +129,7 @@ impl Trace {
         progress.message("simulating the error before and after");
         let errors = errors(&recordings, &named.answer, held_out, seed)?;
         interrupt::check()?;
+        remarks.extend(sizes_by_run_in_words(&named.answer));
         if named.answer.verdict != Verdict::Faithful {
             remarks.extend(only_beginnings_depart(&named.residual));
         }
@@ -138,6 +141,7 @@ impl Trace {
         }
         let mut trace = Self {
             remarks,
+            judged_by_the_fitted,
             laps_simulated: traced.atlas.spent(),
             experiments: Vec::new(),
             recordings,
@@ -159,6 +163,20 @@ impl Trace {
             .effect
             .extend(self.answer.settings().iter().map(setup::effect_table));
         config
+    }
+
+    /// Whether the only run there is was fitted and judges too.
+    pub(crate) fn is_judged_by_the_fitted(&self) -> bool {
+        self.judged_by_the_fitted
+    }
+
+    /// The runs that judge, in words.
+    pub(crate) fn judged_runs(&self) -> &'static str {
+        if self.judged_by_the_fitted {
+            "the run that was fitted"
+        } else {
+            "held-out runs"
+        }
     }
 
     /// Mean over all held-out runs of one of the errors, m.

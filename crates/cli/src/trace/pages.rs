@@ -104,7 +104,8 @@ pub(crate) fn summary(trace: &Trace) -> String {
     let further = further_in_words(trace);
     let next = next_in_words(trace).map_or(String::new(), |next| format!("\n{next}"));
     format!(
-        "{said}{alternatives}{further}{next}\nError of the mean lap on held-out runs: {:.2} mm before, {:.2} mm after; {:.2} mm would be chance.",
+        "{said}{alternatives}{further}{next}\nError of the mean lap on {}: {:.2} mm before, {:.2} mm after; {:.2} mm would be chance.",
+        trace.judged_runs(),
         MM * trace.mean_m(|e| &e.before_m),
         MM * trace.mean_m(|e| &e.after_m),
         MM * trace.mean_m(|e| &e.floor_m)
@@ -239,7 +240,7 @@ fn diagnosis(trace: &Trace) -> Vec<Block> {
 
 fn error_table(trace: &Trace) -> Table {
     let mut table = Table::new(
-        "The simulation against the held-out runs",
+        format!("The simulation against {}", trace.judged_runs()),
         &["", "before", "after", "chance"],
     );
     let mm = |m: f64| format!("{:.2}", MM * m);
@@ -298,7 +299,7 @@ fn residual(trace: &Trace) -> Vec<Block> {
     let answer = trace.answer.explanations.first();
     let mut table = Table::new(
         "What the laps hold beyond the expectation of the declared model, and of the model with the answer",
-        &["", "freedom", "excess", "p", "with the answer", "p"],
+        &["part", "freedom", "excess", "p", "with the answer", "p with it"],
     );
     let words = [
         "mean lap",
@@ -319,6 +320,10 @@ fn residual(trace: &Trace) -> Vec<Block> {
     for (i, (name, declared)) in named(&trace.residual).into_iter().enumerate() {
         let left = (remainder.as_ref()).map_or(["-".into(), "-".into()], |left| shown(left[i].1));
         let row = [name.to_owned(), declared.freedom.to_string()];
+        if declared.freedom == 0 {
+            table.push(row.into_iter().chain(["-"; 4].map(String::from)));
+            continue;
+        }
         table.push(row.into_iter().chain(shown(declared)).chain(left));
     }
     let of = of_shown(trace);
@@ -346,10 +351,16 @@ fn candidates(trace: &Trace) -> Vec<Block> {
     } else {
         "; what those marked + have besides may be there"
     };
+    let rivals = trace.answer.indistinguishable;
+    let and_rivals = if rivals > 1 {
+        format!("; those marked * cannot be told apart by these {source}")
+    } else {
+        String::new()
+    };
     let mut table = Table::new(
         format!(
-            "Explanations fitted to the {source}, best first by what they gain less the price of their numbers; those marked * cannot be \
-             told apart by these {source}{and_further}"
+            "Explanations fitted to the {source}, best first by what they gain less the price of their numbers, with sizes ± one standard \
+             error{and_rivals}{and_further}"
         ),
         &[
             "effect",
@@ -361,7 +372,7 @@ fn candidates(trace: &Trace) -> Vec<Block> {
         ],
     );
     for (place, e) in trace.answer.explanations.iter().enumerate() {
-        let mark = if place < trace.answer.indistinguishable {
+        let mark = if rivals > 1 && place < rivals {
             " *"
         } else if further.contains(&e) {
             " +"
@@ -418,7 +429,8 @@ fn before_and_after(trace: &Trace) -> Vec<Block> {
             "Fig. B",
             format!(
                 "Mean position at each gate: measured, simulated with the declared model, and with the answer. Below, what each of \
-                 the two leaves of the measured mean lap; in the band, 95 of 100 gates lie by chance.{of}"
+                 the two leaves of the measured mean lap; in the band, 95 of 100 gates lie by chance. The mean over all runs is nearer \
+                 to both than single runs, whose errors the table has.{of}"
             ),
             pictures::mean_laps(trace),
         ),

@@ -432,9 +432,10 @@ pub(super) fn observed_runs(recordings: &[&Recording]) -> Result<Vec<ObservedRun
     for ((run, file), observed) in runs.zip(files).zip(&observed) {
         ensure!(
             observed.laps.len() >= 3,
-            "{}: {} whole laps after the first: at least 3 in every run are needed to trace anything; {}",
+            "{}: {} whole lap{} after the first, which is not analysed: at least 3 in every run are needed to trace anything; {}",
             file.path.display(),
             observed.laps.len(),
+            if observed.laps.len() == 1 { "" } else { "s" },
             if run.wanted < 3 {
                 "raise `laps` in dataset.toml if there are more, or measure longer"
             } else {

@@ -1,20 +1,38 @@
 //! What a reader must know of the data.
 
-use diagnose::LogRow;
+use diagnose::{Answer, LogRow};
+use sim::Pattern;
 
 use super::logs::Logs;
 use super::recording::{Recording, runs};
 use crate::laps::SampledRun;
 
-/// What these data do not allow; `logged` are the logs that are used.
-pub(super) fn remarks(recordings: &[Recording], logged: Option<&Logs>) -> Vec<String> {
+/// What the error after means where sizes go by run.
+pub(super) fn sizes_by_run_in_words(answer: &Answer) -> Option<String> {
+    let claimed = answer.claimed()?;
+    let by_run =
+        (claimed.effects.iter()).filter(|effect| matches!(effect.setting.pattern, Pattern::ByRun(_)));
+    let names: Vec<&str> = by_run.map(|effect| effect.setting.spec.name).collect();
+    (!names.is_empty()).then(|| {
+        format!(
+            "The size of {} differs from run to run: that of a run which is held out is not known, and the mean of the others stands \
+             for it. The error after is that of such a run; model.after.toml has each run's own size.",
+            names.join(" and ")
+        )
+    })
+}
+
+/// What these data do not allow; `logged` are the logs that are used, and other runs may be held out.
+pub(super) fn remarks(recordings: &[Recording], logged: Option<&Logs>, others_held_out: bool) -> Vec<String> {
     let mut remarks = Vec::new();
     if runs(recordings).count() == 1 {
-        remarks.push(
+        remarks.push(if others_held_out {
+            "One run only: whether the robot differs from run to run cannot be told; measure a second run.".to_owned()
+        } else {
             "One run only: whether the robot differs from run to run cannot be told, and the error after is that of \
              the very run that was fitted; measure a second run, or give one with --held-out."
-                .to_owned(),
-        );
+                .to_owned()
+        });
     }
     for recording in recordings {
         if let Some(unit_m) = recording.written_m {

@@ -154,6 +154,11 @@ impl Atlas {
             counting();
             simulate(effects, set, extent)
         };
+        let first = simulate(&[], 0, Extent::Whole).ok_or(Error::DeclaredModelStops)?;
+        let gates = (first.iter().flat_map(|run| &run.laps).next()).map_or(0, |lap| lap.seen.offsets_m.len());
+        if (1..BLOCKS).contains(&gates) {
+            return Err(Error::TooFewGates { gates, least: BLOCKS });
+        }
         let declared = |set: u64| -> Result<(Summary, Power), Error> {
             let runs = ticking(&[], set, Extent::Whole).ok_or(Error::DeclaredModelStops)?;
             let summary = Summary::new(&runs, &[runs.len()]).ok_or(Error::TooFewLaps)?;
@@ -165,7 +170,6 @@ impl Atlas {
             .into_iter()
             .unzip();
         let expectation = Expectation::of(null.iter(), alike);
-        let first = simulate(&[], 0, Extent::Whole).ok_or(Error::DeclaredModelStops)?;
         let layout = Layout::of_recording(&first, expectation.0[0].trend.len());
         let directions = directions(cuts, &null, &counting);
         let mean_laps = layout.total_laps() as f64 / layout.runs() as f64;

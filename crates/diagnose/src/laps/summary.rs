@@ -72,8 +72,7 @@ pub(super) struct RunSummary {
 pub(super) struct Summary(pub(super) Vec<Recording>);
 
 impl Summary {
-    /// The summary of runs of closed laps, `counts` of them in each recording; `None` if a run has fewer than three, or
-    /// they have too few gates.
+    /// The summary of runs of closed laps, `counts` of them in each recording; `None` if a run has fewer than three.
     pub(super) fn new(runs: &[ObservedRun], counts: &[usize]) -> Option<Self> {
         let mut rest = runs;
         let recordings = counts.iter().map(|&count| {

@@ -13,14 +13,16 @@ pub struct Channel {
     pub mean_square: f64,
     /// Fourth moment over squared second moment, 3 for normal ones.
     pub kurtosis: f64,
-    /// Product of neighbours over the mean square, 0 under the model.
+    /// Pairs of control steps, one right after the other, in which both count.
+    pub pairs: usize,
+    /// Mean product of such pairs over the mean square, 0 under the model.
     pub correlation: f64,
 }
 
 impl Channel {
     /// What a first-order autoregression gains in log-likelihood over white innovations: -n/2 log(1 - r^2).
     pub(super) fn gain_of_memory(&self) -> f64 {
-        -0.5 * self.count as f64 * (-self.correlation.powi(2)).ln_1p()
+        -0.5 * self.pairs as f64 * (-self.correlation.powi(2)).ln_1p()
     }
 
     /// What a mean that makes innovations too wide may gain at most in log-likelihood.
@@ -32,18 +34,24 @@ impl Channel {
 /// Moments of the innovations.
 pub(super) fn channels(traces: &[(World<'_>, Trace)]) -> [Channel; MEASURED] {
     std::array::from_fn(|m| {
-        let (mut count, mut sums, mut before) = (0_usize, [0.0; 3], 0.0);
+        let (mut count, mut pairs, mut sums) = (0_usize, 0_usize, [0.0; 3]);
         for (_, trace) in traces {
-            for instant in trace.instants.iter().filter(|instant| instant.used >> m & 1 == 1) {
-                if m >= 2 && instant.uncut[m - 2] < 4.0 * instant.deviation[m - 2] {
+            let mut before: Option<f64> = None;
+            for instant in &trace.instants {
+                let is_near_cut = m >= 2 && instant.uncut[m - 2] < 4.0 * instant.deviation[m - 2];
+                if instant.used >> m & 1 == 0 || is_near_cut {
+                    before = None;
                     continue;
                 }
                 let e = instant.innovation[m];
                 count += 1;
                 sums[0] += e * e;
                 sums[1] += e.powi(4);
-                sums[2] += e * before;
-                before = e;
+                if let Some(before) = before {
+                    pairs += 1;
+                    sums[2] += e * before;
+                }
+                before = Some(e);
             }
         }
         let n = count.max(1) as f64;
@@ -53,7 +61,8 @@ pub(super) fn channels(traces: &[(World<'_>, Trace)]) -> [Channel; MEASURED] {
             count,
             mean_square,
             kurtosis: sums[1] / n / (scale * scale),
-            correlation: sums[2] / n / scale,
+            pairs,
+            correlation: sums[2] / pairs.max(1) as f64 / scale,
         }
     })
 }

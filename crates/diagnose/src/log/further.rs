@@ -10,9 +10,8 @@ use super::noise::{Factor, by_chance, noises, p_among_repeats};
 use super::pairs::{Pair, pairs};
 use super::refined::Refined;
 use super::repeat::repeats;
-use super::search::{
-    FAULTS, FIRST_STEPS, MATTERS, PROMISING, SIGNIFICANT_P, STEPS, Search, least_in_reach, most_left,
-};
+use super::search::{FAULTS, FIRST_STEPS, MATTERS, PROMISING, STEPS, Search, least_in_reach, most_left};
+use crate::laps::SIGNIFICANT_P;
 
 impl Search<'_> {
     /// Looks for one more effect beside the best candidate, and beside one of one effect for the best pairs, if that leaves more than it

@@ -85,6 +85,8 @@ pub(crate) fn likelihood_of_cut(reading: f64, mean: f64, deviation: f64, step: f
     /// Standard deviations below 0 from where on a mean is as good as any lower one: a reading that is not 0 after all is no
     /// proof of the contrary.
     const SHUT: f64 = 3.0;
+    /// Standard deviations above 0 from where on the tail is a series.
+    const FAR: f64 = 8.0;
     let deviation = blurred(deviation, step);
     let mean = mean.max(-SHUT * deviation);
     if reading > 0.0 {
@@ -94,7 +96,16 @@ pub(crate) fn likelihood_of_cut(reading: f64, mean: f64, deviation: f64, step: f
             square: z * z,
         };
     }
-    let shut = 0.5 * erfc((mean - 0.5 * step) / deviation * std::f64::consts::FRAC_1_SQRT_2);
+    let z = (mean - 0.5 * step) / deviation;
+    if z > FAR {
+        // The tail's density over z: it is less than any number soon (Abramowitz and Stegun 26.2.12).
+        let per_square = 1.0 / (z * z);
+        return Likelihood {
+            factor: (1.0 - per_square * (1.0 - 3.0 * per_square * (1.0 - 5.0 * per_square))) / z,
+            square: z * z,
+        };
+    }
+    let shut = 0.5 * erfc(z * std::f64::consts::FRAC_1_SQRT_2);
     Likelihood {
         factor: shut * std::f64::consts::TAU.sqrt(),
         square: 0.0,
@@ -166,6 +177,18 @@ mod tests {
             let slope = (at(mean + 0.01) - at(mean - 0.01)) / 0.02;
             assert!(slope.abs() < 1e-6, "{mean}: {slope}");
         }
+    }
+
+    #[test]
+    fn a_zero_is_the_less_likely_the_farther_off_it_is() {
+        let ln = |z: f64| likelihood_of_cut(0.0, z, 1.0, 0.0).ln();
+        // On both sides of where the series begins it is the tail of a normal distribution.
+        assert!((ln(8.0) - ln(8.0 + 1e-9)).abs() < 1e-5);
+        for (z, next) in (0..1000).map(|i| (0.1 * f64::from(i), 0.1 * f64::from(i + 1))) {
+            assert!(ln(next) < ln(z) && ln(next).is_finite(), "{z}");
+        }
+        // Its slope is that of -z^2/2 - ln z.
+        assert!((ln(60.0) - ln(59.0) + 59.5 + (60.0_f64 / 59.0).ln()).abs() < 1e-4);
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use rayon::prelude::*;
-use sim::{Param, Pattern, Setting, Spec};
+use sim::{Pattern, Setting, Spec};
 use statrs::statistics::Statistics;
 
 use super::catalogue::{Variant, leaps};
@@ -214,7 +214,7 @@ impl Refined {
         });
         for (i, (setting, errors)) in self.settings.iter().zip(&mut self.standard_errors).enumerate() {
             for (j, (value, error)) in setting.pattern.numbers().iter().zip(errors).enumerate() {
-                let param = param_of(setting, j);
+                let param = setting.param(j);
                 let square = |fit: &Vec<Setting>| apart(fit[i].pattern.numbers()[j], *value, param).powi(2);
                 let mean = fits.iter().map(square).sum::<f64>() / fits.len() as f64;
                 if *error > 0.0 {
@@ -349,15 +349,6 @@ fn refined(fitted: Fitted, base: f64, by: By) -> Refined {
         }
     }
     refined
-}
-
-/// The parameter that one of the pattern's numbers is of; none of a change per second.
-fn param_of(setting: &Setting, number: usize) -> Option<&'static Param> {
-    let own = match &setting.pattern {
-        Pattern::ByRun(runs) => number % runs[0].len(),
-        Pattern::Constant(_) | Pattern::ByTime { .. } => number,
-    };
-    setting.spec.params.get(own)
 }
 
 /// How the values of several effects go over the runs: as those that go most freely.

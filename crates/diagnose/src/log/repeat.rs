@@ -38,13 +38,13 @@ pub(crate) fn some_repeats<R: Send>(
     numbers.into_par_iter().filter_map(one).collect()
 }
 
-/// One log for each run, as long as what was used of the measured one.
+/// One log for each run, as long as what was used of the measured one and with its holes.
 fn simulated(evidence: &Evidence<'_>, settings: &[Setting], repeat: u64) -> Option<Vec<Vec<LogRow>>> {
     const SEED: u64 = 1 << 52;
     let log_of = |run: usize| {
         let own = evidence.stretches.iter().filter(|stretch| stretch.run == run);
-        let count: usize = own.map(|stretch| stretch.rows.len()).sum();
-        if count == 0 {
+        let mut measured = own.flat_map(|stretch| stretch.rows).peekable();
+        if measured.peek().is_none() {
             return Some(Vec::new());
         }
         let world = evidence.world(settings, run).ok()?;
@@ -53,7 +53,8 @@ fn simulated(evidence: &Evidence<'_>, settings: &[Setting], repeat: u64) -> Opti
             run: run as u64,
         };
         let mut drive = Run::new(&world, streams).ok()?;
-        Some((0..count).map(|_| LogRow::from(drive.step())).collect())
+        let row = |measured: &LogRow| LogRow::from(drive.step()).with_holes_of(measured);
+        Some(measured.map(row).collect())
     };
     (0..=*evidence.runs().last()?).map(log_of).collect()
 }

@@ -54,6 +54,17 @@ impl LogRow {
         }
     }
 
+    /// The same without what another row lacks: a position, readings.
+    pub(crate) fn with_holes_of(mut self, other: &Self) -> Self {
+        self.observed = self.observed.filter(|_| other.observed.is_some());
+        for (reading, other) in self.readings.iter_mut().zip(other.readings) {
+            if !other.is_finite() {
+                *reading = f64::NAN;
+            }
+        }
+        self
+    }
+
     /// Whether it has readings, or some of them, and the command that followed.
     pub fn tells(&self) -> bool {
         self.commands() && self.readings.iter().any(|reading| reading.is_finite())
@@ -62,14 +73,6 @@ impl LogRow {
     /// Whether the command is known.
     pub(crate) fn commands(&self) -> bool {
         self.command.left_m_s.is_finite() && self.command.right_m_s.is_finite()
-    }
-
-    /// The readings, where none is missing.
-    pub(crate) fn read(&self) -> Option<&Readings> {
-        self.readings
-            .iter()
-            .all(|reading| reading.is_finite())
-            .then_some(&self.readings)
     }
 }
 
@@ -180,31 +183,31 @@ const SHORTEST: usize = 200;
 pub(crate) fn start_pose(rows: &[LogRow], robot: &Robot, rules: &RunRules) -> Option<Pose> {
     const LEAST_ROWS: usize = 32;
     const LEAST_SPREAD_M: f64 = 0.03;
+    let first = rows.iter().find_map(|row| row.observed)?;
     let mut at = Pose::new(0.0, 0.0, 0.0);
-    let mut pairs: Vec<(Vec2, Vec2)> = Vec::new();
+    let (mut count, mut from, mut to) = (0_usize, Vec2::ZERO, Vec2::ZERO);
+    let (mut square_m2, mut turn) = (0.0, Vec2::ZERO);
     for row in rows {
-        pairs.extend(row.observed.map(|seen| (at.position, seen)));
+        if let Some(seen) = row.observed {
+            let (p, q) = (at.position, seen - first);
+            count += 1;
+            (from, to) = (from + p, to + q);
+            square_m2 += p.length_squared();
+            turn += Vec2::new(p.dot(q), p.perp_dot(q));
+        }
         at = robot.roll(at, row.command, rules.control_step_s);
-        if pairs.len() >= LEAST_ROWS {
-            let count = pairs.len() as f64;
-            let (from, to) = pairs
-                .iter()
-                .fold((Vec2::ZERO, Vec2::ZERO), |(a, b), (p, q)| (a + *p, b + *q));
-            let (from, to) = (from / count, to / count);
-            let spread_m2: f64 = pairs.iter().map(|(p, _)| p.distance_squared(from)).sum::<f64>() / count;
-            if spread_m2.sqrt() > LEAST_SPREAD_M {
-                let turn = pairs.iter().fold(Vec2::ZERO, |sum, (p, q)| {
-                    let (p, q) = (*p - from, *q - to);
-                    sum + Vec2::new(p.dot(q), p.perp_dot(q))
-                });
-                let heading = turn.normalize();
+        if count >= LEAST_ROWS {
+            let count = count as f64;
+            let (middle, seen) = (from / count, to / count);
+            if square_m2 / count - middle.length_squared() > LEAST_SPREAD_M * LEAST_SPREAD_M {
+                let heading = (turn - Vec2::new(middle.dot(seen), middle.perp_dot(seen)) * count).normalize();
                 let turned = Pose {
                     position: Vec2::ZERO,
                     heading,
                 }
-                .rotate(from);
+                .rotate(middle);
                 return Some(Pose {
-                    position: to - turned,
+                    position: first + seen - turned,
                     heading,
                 });
             }

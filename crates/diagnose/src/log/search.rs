@@ -19,14 +19,13 @@ use super::repeat::repeats;
 use super::screen::normals;
 use super::unnamed::Unnamed;
 use crate::candidate::label;
+use crate::laps::SIGNIFICANT_P;
 use crate::{Detectable, Error};
 
 /// A probability below which something is there: one false alarm in a hundred data sets.
 const ALARM: f64 = 0.01;
 /// Share of a gain that faults of the model may take: at very high signal none is exact.
 pub(super) const FAULTS: f64 = 0.01;
-/// A probability below which a remainder is significant.
-pub(super) const SIGNIFICANT_P: f64 = 1e-3;
 /// Share of the explained log-likelihood that a remainder may have at very high signal.
 pub(super) const MATTERS: f64 = 0.02;
 /// Leads that are refined.

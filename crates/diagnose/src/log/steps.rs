@@ -10,9 +10,7 @@ const LOOKED_AT: usize = 4000;
 /// The step of which all readings are multiples, counts; `None` if they are not multiples of anything coarser than
 /// what the file can tell, which may have whole counts.
 pub(crate) fn reading_step(runs: &[&[LogRow]]) -> Option<f64> {
-    let readings: Vec<f64> = (runs.iter().flat_map(|rows| rows.iter()).filter_map(LogRow::read))
-        .flatten()
-        .copied()
+    let readings: Vec<f64> = (runs.iter().flat_map(|rows| finite(rows)))
         .filter(|&reading| reading > 0.0 && reading < 4000.0)
         .collect();
     let every = (readings.len() / LOOKED_AT).max(1);
@@ -42,12 +40,17 @@ pub(crate) fn written_counts(rows: &[LogRow]) -> f64 {
     const DECIMALS: std::ops::RangeInclusive<i32> = 0..=6;
     let all_are_multiples = |decimals: &i32| {
         let scale = 10.0_f64.powi(*decimals);
-        let is_multiple = |reading: &f64| (scale * reading - (scale * reading).round()).abs() < 1e-4;
-        let mut readings = rows.iter().filter_map(LogRow::read);
-        readings.all(|readings| readings.iter().all(is_multiple))
+        let is_multiple = |reading: f64| (scale * reading - (scale * reading).round()).abs() < 1e-4;
+        finite(rows).all(is_multiple)
     };
     let decimals = DECIMALS.clone().find(all_are_multiples);
     10.0_f64.powi(-decimals.unwrap_or(*DECIMALS.end()))
+}
+
+/// The readings that are there.
+fn finite(rows: &[LogRow]) -> impl Iterator<Item = f64> {
+    let all = rows.iter().flat_map(|row| row.readings);
+    all.filter(|reading| reading.is_finite())
 }
 
 /// Whether all readings lie within the file's rounding of multiples of something near the guess, which is known no better where
@@ -120,6 +123,15 @@ mod tests {
         );
         let found = reading_step(&[&rows(2.0)]).unwrap();
         assert!((found - 2.0).abs() < 1e-6, "{found}");
+    }
+
+    #[test]
+    fn a_sensor_that_is_not_there_hides_no_step() {
+        let mut rows = rows(7.3);
+        rows.iter_mut().for_each(|row| row.readings[3] = f64::NAN);
+        let found = reading_step(&[&rows]).unwrap();
+        assert!((found / 7.3 - 1.0).abs() < 1e-3, "{found}");
+        assert_eq!(written_counts(&rows), 0.1);
     }
 
     #[test]

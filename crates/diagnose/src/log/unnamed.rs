@@ -260,6 +260,7 @@ mod tests {
             count: 20_000,
             mean_square: 1.0,
             kurtosis: 3.0,
+            pairs: 20_000,
             correlation: 0.01,
         }; MEASURED];
         all[channel].correlation = correlation;

@@ -42,6 +42,17 @@ pub struct Setting {
 }
 
 impl Setting {
+    /// The parameter of one of the pattern's [numbers](Pattern::numbers), by its place among them; `None` of a change per second.
+    pub fn param(&self, place: usize) -> Option<&'static Param> {
+        let spec: &'static Spec = self.spec;
+        match &self.pattern {
+            Pattern::Constant(_) => spec.param(place),
+            Pattern::ByRun(runs) => spec.param(place % runs.first()?.len().max(1)),
+            Pattern::ByTime { start, .. } if place >= start.len() => None,
+            Pattern::ByTime { .. } => spec.param(place),
+        }
+    }
+
     /// An effect with the same values always.
     pub fn constant(spec: &'static Spec, values: impl Into<Vec<f64>>) -> Self {
         Self {
@@ -59,14 +70,14 @@ impl Setting {
             Pattern::Constant(values) => Ok((values, None)),
             Pattern::ByTime { start, per_s } => Ok((start, Some(per_s))),
             Pattern::ByRun(runs) => {
+                let count = runs.len();
                 runs.get(run)
                     .map(|values| (values.as_slice(), None))
                     .ok_or(Error::Invalid {
                         key: format!("effect.{index}.by"),
                         reason: format!(
-                            "{} has values by run for {} of them, and there are more",
+                            "{} has values by run for {count} of them, and there are more; give as many values, or drive {count}",
                             self.spec.name,
-                            runs.len(),
                         ),
                     })
             }
