@@ -26,6 +26,14 @@ fn a_log_with_gaps_is_traced() {
     let found = trace(&scratch, "braitenberg", "set", &[]);
     says(&found, "explained", &["wheel-asymmetry"]);
     holds(&found["effects"][0], "ratio", LIMPING, 1.0);
+    let missing = ": 10 control steps of this run have no row, 10 of them after this one.";
+    assert_eq!(
+        remarks(&found)
+            .iter()
+            .filter(|remark| remark.ends_with(missing))
+            .count(),
+        2
+    );
 }
 
 /// The robot that the model declares.

@@ -221,10 +221,6 @@ fn models_with_keys_or_values_that_are_not_there() {
             "model.toml:2: effect.0.kind: one-sensor-gain without `gain` does nothing",
         ),
         (
-            "[[effect]]\nkind = \"reading-gain\"\nby = \"run\"\ngain = [1.1]\n",
-            "model.toml:3: effect.0.by: reading-gain has values by run for 1 of them, and there are more; give as many values, or drive 1",
-        ),
-        (
             "[sensor]\nrays = 100000000\n",
             "model.toml:2: sensor.rays = 100000000 is outside [1, 10000]",
         ),
@@ -237,6 +233,14 @@ fn models_with_keys_or_values_that_are_not_there() {
         scratch.write("model.toml", text);
         scratch.refuses(&["drive", "model.toml", "--out", "o"], message);
     }
+    scratch.write(
+        "by_run.toml",
+        "[[effect]]\nkind = \"reading-gain\"\nby = \"run\"\ngain = [1.1, 1.2]\n",
+    );
+    scratch.refuses(
+        &["drive", "by_run.toml", "--runs", "3", "--out", "o"],
+        "by_run.toml:3: effect.0.by: reading-gain has values by run for 2 of them, and there are more; give as many values, or drive 2",
+    );
     for (set, message) in [
         ("slip.level=nan", "slip.level = nan is not a finite number"),
         ("slip.level=7", "slip.level = 7 is outside [0, 1]"),
@@ -290,7 +294,7 @@ fn runs_that_cannot_be_read() {
     let scratch = Scratch::new();
     let rectangle = "give every row as many, empty where a value is missing";
     let missing = "leave the field empty if it is missing";
-    let blind = "0 whole laps, and the first is not analysed: at least two are needed; check the world, the driving \
+    let blind = "0 whole laps, and the first is not analysed: at least two are needed, and four to trace; check the world, the driving \
                  direction ([declared] run.direction in dataset.toml) and the unit of x_m and y_m";
     for (run, message) in [
         ("t_s,x_m\n0,1\n", "run_a.csv:1: column y_m is missing; there are: t_s, x_m".to_owned()),
@@ -619,7 +623,7 @@ fn folders_that_are_not_ours_or_cannot_be_made() {
             "--runs",
             "1",
             "--laps",
-            "1",
+            "3",
             "--seed",
             seed,
             "--out",
@@ -627,6 +631,18 @@ fn folders_that_are_not_ours_or_cannot_be_made() {
         ]);
     }
     assert!(scratch.read("empty/manifest.json").contains("\"seed\": 2"));
+    // Not what a result is made from, nor what somebody else has put there.
+    scratch.refuses(
+        &["compare", "empty", &set, "--out", "empty"],
+        "empty/dataset.toml lies in empty, which would be replaced; name another folder with --out",
+    );
+    scratch.write("empty/notes.txt", "mine");
+    scratch.refuses(
+        &["drive", "roduit2007", "--out", "empty"],
+        "empty holds notes.txt, which lapwing did not write, so it is not replaced; move that file away, or name another folder \
+         with --out",
+    );
+    assert_eq!(scratch.read("empty/notes.txt"), "mine");
 }
 
 /// A disk that fills up while a data set is written, played by a small file system where one can be mounted.

@@ -186,7 +186,9 @@ fn a_size_by_run_is_known_where_there_are_logs_and_judged_by_their_laps() {
     let found = trace(&scratch, "braitenberg", "set", &["--measured", "seen"]);
     near(&found, &[20.0, 0.0, 10.0, 10.0]);
     let said = "seen has no logs: its laps judge what the other data sets' logs say, unless sizes go by run.";
-    assert_eq!(found["remarks"], serde_json::json!([said]));
+    let by_run = "The size of directional-light differs from run to run: that of a run which is held out is not known, and the mean of \
+                  the others stands for it. The error after is that of such a run; model.after.toml has each run's own size.";
+    assert_eq!(found["remarks"], serde_json::json!([said, by_run]));
 }
 
 #[test]
@@ -264,6 +266,10 @@ fn a_model_whose_effect_goes_by_run_has_a_size_for_each_run_of_all_sets() {
     says(&found, "faithful", &[]);
     let [before, floor] = ["before", "floor"].map(|key| found["error"][key].as_f64().unwrap());
     assert!((0.6..1.6).contains(&(before / floor)), "{before} {floor}");
+
+    // It is driven as often as it has sizes.
+    scratch.done(["drive", "lit.toml", "--laps", "1", "--out", "driven"]);
+    assert!(scratch.path("driven/run_b.csv").exists() && !scratch.path("driven/run_c.csv").exists());
 
     let other = by_run("directional-light", &[&[10.0, 1.0], &[5.0, 1.0]]);
     Robot::with(other).logged(&[5; 2]).record(&scratch, "more");

@@ -4,7 +4,6 @@ use std::fs;
 use std::ops::Range;
 use std::path::PathBuf;
 
-use serde_json::Value;
 use sim::{Pattern, Setting};
 
 use crate::ground;
@@ -30,7 +29,11 @@ fn one_run_is_traced_and_what_it_cannot_tell_is_said() {
         remark.starts_with("One run only: whether the robot differs from run to run"),
         "{remark}"
     );
-    assert!(scratch.read("out/report.html").contains("One run only"));
+    let report = scratch.read("out/report.html");
+    assert!(
+        report.contains("One run only") && report.contains("The simulation against the run that was fitted")
+    );
+    assert_eq!(found["error"]["held_out"], serde_json::json!([]));
 }
 
 #[test]
@@ -72,7 +75,7 @@ fn two_laps_are_too_few() {
             "--no-cache",
             "--quiet",
         ],
-        "set/run_b.csv: 2 whole laps after the first: at least 3 in every run are needed to trace anything; leave the \
+        "set/run_b.csv: 2 whole laps after the first, which is not analysed: at least 3 in every run are needed to trace anything; leave the \
          run out of `runs` in dataset.toml, or measure it again",
     );
 }
@@ -155,8 +158,8 @@ fn a_run_whose_log_has_no_readings_has_the_mean_size_of_the_others() {
     );
 }
 
-/// A log whose columns from `first` on are multiplied: no controller gives those commands, and nothing is named.
-fn in_other_units(columns: Range<usize>, factor: f64) -> Value {
+/// The report on a log of which some columns are multiplied: no controller gives those commands, and nothing is named.
+fn in_other_units(columns: Range<usize>, factor: f64) -> String {
     let scratch = Scratch::new();
     limping().logged(&[3; 2]).record(&scratch, "set");
     for run in ["set/run_a.csv", "set/run_b.csv"] {
@@ -170,18 +173,21 @@ fn in_other_units(columns: Range<usize>, factor: f64) -> Value {
     let decide = &found["logs"]["decide"];
     assert_eq!(decide["verdict"], "no controller of this kind", "{decide}");
     assert!(decide["commands_unexplained"].as_f64().unwrap() > 0.5, "{decide}");
-    assert!(scratch.read("out/report.html").contains("look at the units"));
-    found
+    let report = scratch.read("out/report.html");
+    assert!(report.contains("Look at the units"));
+    report
 }
 
 #[test]
 fn speeds_in_millimetres_are_no_controllers() {
-    in_other_units(11..13, 1000.0);
+    let report = in_other_units(11..13, 1000.0);
+    assert!(report.contains("m/s, and the declared wheels reach 0.129 m/s"));
 }
 
 #[test]
 fn readings_as_shares_of_full_scale_are_no_controllers() {
-    in_other_units(3..11, 1.0 / 4095.0);
+    let report = in_other_units(3..11, 1.0 / 4095.0);
+    assert!(!report.contains("the declared wheels reach"));
 }
 
 #[test]
@@ -196,7 +202,7 @@ fn positions_in_millimetres_are_refused() {
     });
     scratch.refuses(
         &["trace", "roduit2007", "--measured", "set", "--out", "out", "--no-cache", "--quiet"],
-        "set/run_a.csv: 0 whole laps, and the first is not analysed: at least two are needed; check the world, the \
+        "set/run_a.csv: 0 whole laps, and the first is not analysed: at least two are needed, and four to trace; check the world, the \
          driving direction ([declared] run.direction in dataset.toml) and the unit of x_m and y_m",
     );
 }

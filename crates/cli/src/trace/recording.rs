@@ -238,6 +238,25 @@ impl Recording {
         runs.filter_map(of_run).collect()
     }
 
+    /// Control steps of logs that have no row, in words.
+    pub(super) fn missing_rows_in_words(&self) -> Vec<String> {
+        let step_s = self.setup.model.run.control_step_s;
+        let of_run = |file: &RunFile| {
+            file.rows.log.as_ref()?;
+            let t_s = &file.rows.t_s;
+            let missing = |row: usize| ((t_s[row + 1] - t_s[row]) / step_s).round() as usize - 1;
+            let gaps = (0..t_s.len().saturating_sub(1)).filter(|&row| t_s[row + 1] - t_s[row] > 1.5 * step_s);
+            let longest = gaps.clone().max_by_key(|&row| missing(row))?;
+            Some(format!(
+                "{}: {} control steps of this run have no row, {} of them after this one.",
+                file.place(longest),
+                gaps.map(missing).sum::<usize>(),
+                missing(longest)
+            ))
+        };
+        self.measured.set.runs.iter().filter_map(of_run).collect()
+    }
+
     /// Whether the camera did not see the robot throughout its laps.
     pub(super) fn has_holes(&self) -> bool {
         !self.unseen.iter().all(Unseen::is_nothing)

@@ -43,6 +43,7 @@ pub(super) fn remarks(recordings: &[Recording], logged: Option<&Logs>, others_he
             ));
         }
         remarks.extend(recording.clocks_in_words());
+        remarks.extend(recording.missing_rows_in_words());
         remarks.extend(recording.beginnings.in_words());
         let gates = recording.measured.circuit.gates.len();
         for (run, unseen) in recording.measured.runs.iter().zip(&recording.unseen) {
