@@ -87,7 +87,7 @@ pub(crate) struct Reproduce {
     /// Measured data set; give one per controller [default: the laps that are shipped]
     #[arg(long, value_name = "DIR")]
     pub(crate) measured: Vec<PathBuf>,
-    /// Folder for the report [default: lapwing-report]
+    /// Folder for the report, in place of an earlier result there [default: lapwing-report]
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
     /// How often everything is simulated, each time with random numbers of its own: what the intervals rest on
@@ -152,7 +152,7 @@ pub(crate) struct Drive {
     /// Name of the data set [default: the controller and a hash of the configuration]
     #[arg(long)]
     pub(crate) name: Option<String>,
-    /// Folder for the data set
+    /// Folder for the data set, in place of an earlier result there
     #[arg(long, value_name = "DIR")]
     pub(crate) out: PathBuf,
     /// Print the summary as JSON
@@ -185,7 +185,7 @@ pub(crate) struct Compare {
     /// Print one JSON document instead of tables
     #[arg(long)]
     pub(crate) json: bool,
-    /// Folder for tables and pictures
+    /// Folder for tables and pictures, in place of an earlier result there
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
 }
@@ -215,7 +215,7 @@ pub(crate) struct Sweep {
     /// Go on with a sweep that was stopped
     #[arg(long)]
     pub(crate) resume: bool,
-    /// Folder for tables and pictures
+    /// Folder for tables and pictures, in place of an earlier result there
     #[arg(long, value_name = "DIR")]
     pub(crate) out: PathBuf,
     /// Print sweep.json
@@ -233,7 +233,7 @@ pub(crate) enum World {
         /// Print one JSON document
         #[arg(long)]
         json: bool,
-        /// Folder for the picture of the course
+        /// Folder for the picture of the course, in place of an earlier result there
         #[arg(long, value_name = "DIR")]
         out: Option<PathBuf>,
     },
@@ -253,7 +253,7 @@ pub(crate) enum World {
         /// Print one JSON document
         #[arg(long)]
         json: bool,
-        /// Folder for the picture of N against the error
+        /// Folder for the picture of N against the error, in place of an earlier result there
         #[arg(long, value_name = "DIR")]
         out: Option<PathBuf>,
     },
@@ -270,7 +270,7 @@ pub(crate) struct FitSensor {
     /// Print one JSON document
     #[arg(long)]
     pub(crate) json: bool,
-    /// Folder for the picture
+    /// Folder for the picture, in place of an earlier result there
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
 }
@@ -299,7 +299,7 @@ pub(crate) struct Trace {
     /// out of the fit in turn]
     #[arg(long, value_name = "DIR")]
     pub(crate) held_out: Option<PathBuf>,
-    /// Folder for the report
+    /// Folder for the report, in place of an earlier result there
     #[arg(long, value_name = "DIR")]
     pub(crate) out: PathBuf,
     #[command(flatten)]
@@ -331,7 +331,7 @@ pub(crate) enum Bench {
         /// Print one JSON document
         #[arg(long)]
         json: bool,
-        /// Folder for tables and pictures
+        /// Folder for tables and pictures, in place of an earlier result there
         #[arg(long, value_name = "DIR")]
         out: Option<PathBuf>,
     },

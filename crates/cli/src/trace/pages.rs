@@ -298,7 +298,8 @@ fn distance(laps: &MeanLaps, runs: &[SampledRun], modes: usize) -> Option<f64> {
 fn residual(trace: &Trace) -> Vec<Block> {
     let answer = trace.answer.explanations.first();
     let mut table = Table::new(
-        "What the laps hold beyond the expectation of the declared model, and of the model with the answer",
+        "What the laps hold beyond the expectation of the declared model, and of the model with the answer (excess: squared deviations in \
+         units of chance, less as many as chance makes)",
         &["part", "freedom", "excess", "p", "with the answer", "p with it"],
     );
     let words = [
