@@ -181,7 +181,8 @@ impl Logs<'_> {
             search.unnamed = search.unnamed_before_pairs(self.leads);
         }
         if further < MOST && search.unnamed.is_none() && search.one_more(self.leads) {
-            return self.between_walls(search, corners, true, further + 1, rest);
+            let is_clear = search.evidence.clear_with_each(search.rivals()).is_none();
+            return self.between_walls(search, corners, is_clear, further + 1, rest);
         }
         search.finish();
         let (decision, spoilt) = rest;

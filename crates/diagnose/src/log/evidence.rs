@@ -226,9 +226,11 @@ impl<'a> Evidence<'a> {
         })
     }
 
-    /// The evidence of the readings that count with these effects too, if walls, or the robot, then are elsewhere: other rays
-    /// come near the end of the range, and near edges.
+    /// The evidence of the readings that count with these effects too, if they are notably fewer: where walls, or the robot, are
+    /// elsewhere, other rays come near the end of the range, and near edges.
     fn clear_with(&self, settings: &[Setting]) -> Option<Self> {
+        /// Share of the numbers that do as if they were not there.
+        const FEW: f64 = 0.002;
         let narrowed = |stretch: &Stretch<'a>| {
             let (world, trace) = self.trace(stretch, settings)?;
             let (other, declared) = self.trace(stretch, &[])?;
@@ -238,11 +240,18 @@ impl<'a> Evidence<'a> {
                 let clear = clear_readings(&world, &trace, stretch.rows);
                 own.used = stretch.used.iter().zip(&clear).map(|(a, b)| a & b).collect();
             }
-            Some((elsewhere, own))
+            Some(own)
         };
-        let narrowed: Vec<_> = (self.stretches.par_iter().map(narrowed)).collect::<Option<_>>()?;
-        let (elsewhere, stretches): (Vec<bool>, Vec<_>) = narrowed.into_iter().unzip();
-        elsewhere.contains(&true).then_some(Self { stretches, ..*self })
+        let stretches: Vec<Stretch<'a>> = (self.stretches.par_iter().map(narrowed)).collect::<Option<_>>()?;
+        let narrowed = Self { stretches, ..*self };
+        let (before, left) = (self.numbers(), narrowed.numbers());
+        ((before - left) as f64 > FEW * before as f64).then_some(narrowed)
+    }
+
+    /// How many of the measured numbers count.
+    fn numbers(&self) -> usize {
+        let used = self.stretches.iter().flat_map(|stretch| &stretch.used);
+        used.map(|used| used.count_ones() as usize).sum()
     }
 
     /// The log-likelihood with these effects added.
