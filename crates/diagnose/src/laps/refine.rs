@@ -522,13 +522,19 @@ impl Atlas {
         const CHANGING_CONSTANT: f64 = 3.0;
         /// What slips more in one moment does not slip less in the next: laps tell that from less slip as little as memory from more.
         const SWINGING_SLIP: f64 = 3.0;
+        /// Sensors and cameras that have hardly any of their noise: one in twenty that it is not another cause that takes from it.
+        const HARDLY_ANY_NOISE: f64 = 3.0;
+        const HARDLY_ANY: f64 = 0.2;
         let of_part = |part: &Part| {
             let spec = self.probes[part.probe].spec;
             let swings = spec.name == "slip-memory" && part.mean_size(self) < 0.0;
             let changes =
                 part.shape != Shape::Constant && (spec.name == "axle-length" || spec.stage == Stage::Decide);
             let is_known = spec.stage == Stage::Decide;
+            let is_quiet =
+                matches!(spec.name, "reading-noise" | "camera-noise") && part.mean_size(self) < HARDLY_ANY;
             self.choice(part.probe)
+                + if is_quiet { HARDLY_ANY_NOISE } else { 0.0 }
                 + if is_known { KNOWN_CONSTANT } else { 0.0 }
                 + if changes { CHANGING_CONSTANT } else { 0.0 }
                 + if swings { SWINGING_SLIP } else { 0.0 }
