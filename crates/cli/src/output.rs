@@ -240,13 +240,13 @@ fn refuse_foreign(dir: &Path) -> Result<()> {
     }
     let cannot_read = || format!("cannot read {shown}");
     let mut entries = fs::read_dir(dir).with_context(cannot_read)?;
-    if entries.next().is_some() && !is_ours(dir) {
+    let manifest = fs::read(dir.join(MANIFEST)).unwrap_or_default();
+    if entries.next().is_some() && !Manifest::is_ours(&manifest) {
         bail!(
             "{shown} is there and holds no manifest.json of lapwing, so it is not replaced; \
              name another folder with --out, or move it away"
         );
     }
-    let manifest = fs::read(dir.join(MANIFEST)).unwrap_or_default();
     if let Some(written) = Manifest::files(&manifest) {
         let found = files_in(dir).with_context(cannot_read)?;
         if let Some(other) = found.iter().find(|file| !written.contains(file)) {

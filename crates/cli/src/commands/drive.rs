@@ -17,16 +17,6 @@ use crate::session::Session;
 use crate::setup::{self, Setup, locate};
 use crate::table::Table;
 
-/// Runs where nobody says how many: those that the model's effects have values for.
-fn default_runs(model: &Model) -> usize {
-    const USUAL: usize = 4;
-    let by_run = model.effects.iter().filter_map(|effect| match &effect.pattern {
-        Pattern::ByRun(runs) => Some(runs.len()),
-        Pattern::Constant(_) | Pattern::ByTime { .. } => None,
-    });
-    by_run.min().unwrap_or(USUAL)
-}
-
 pub(crate) fn run(session: &Session, args: &args::Drive) -> Result<()> {
     let file = setup::model_file(&args.model)?;
     let world = args.model.settings.world.as_deref();
@@ -107,6 +97,16 @@ pub(crate) fn run(session: &Session, args: &args::Drive) -> Result<()> {
     } else {
         session.print(&text(args, &document))
     }
+}
+
+/// Runs where nobody says how many: those that the model's effects have values for.
+fn default_runs(model: &Model) -> usize {
+    const USUAL: usize = 4;
+    let by_run = model.effects.iter().filter_map(|effect| match &effect.pattern {
+        Pattern::ByRun(runs) => Some(runs.len()),
+        Pattern::Constant(_) | Pattern::ByTime { .. } => None,
+    });
+    by_run.min().unwrap_or(USUAL)
 }
 
 /// The name of a data set that was given none: its controller and what tells it from others, wherever it is written to.

@@ -26,7 +26,7 @@ pub(crate) fn document(trace: &Trace) -> Value {
             "metric": "rms over the gates of the difference between the mean lateral position of simulated laps and of a held-out run, m",
             "before": trace.mean_m(|e| &e.before_m), "after": trace.mean_m(|e| &e.after_m),
             "floor": trace.mean_m(|e| &e.floor_m),
-            "held_out": if trace.is_judged_by_the_fitted() { Vec::new() } else { trace.held_out().map(|run| run.name.clone()).collect() },
+            "held_out": if trace.judged_by_the_fitted { Vec::new() } else { trace.held_out().map(|run| run.name.clone()).collect() },
             "start_of_runs": trace.errors.iter().map(|errors| errors.starts.as_ref().map(starts)).collect::<Vec<_>>(),
         },
         "candidates": answer.explanations.iter().map(|e| candidate(e, trace.laps_alone())).collect::<Vec<_>>(),

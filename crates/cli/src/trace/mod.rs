@@ -62,7 +62,8 @@ pub(crate) struct Trace {
     pub(crate) errors: Vec<Errors>,
     /// What a reader must know of the data.
     pub(crate) remarks: Vec<String>,
-    judged_by_the_fitted: bool,
+    /// Whether the only run there is was fitted and judges too.
+    pub(crate) judged_by_the_fitted: bool,
     /// Experiments that would tell the answer from what these data do not tell it from.
     pub(crate) experiments: Vec<Experiment>,
     /// The smallest sizes of effects that these data show; of laps without logs.
@@ -100,7 +101,7 @@ impl Trace {
         let seed = session.seed();
         let logged = Logs::of(&recordings);
         let judged_by_the_fitted = held_out.is_none() && runs(&recordings).count() == 1;
-        let mut remarks = remarks(&recordings, logged.as_ref(), held_out.is_some());
+        let mut remarks = remarks(&recordings, logged.as_ref(), judged_by_the_fitted);
         let held_out_runs = held_out.iter().flat_map(|held_out| &held_out.runs);
         remarks.extend(held_out_runs.flat_map(SampledRun::remarks));
         // Logs name the effect, and the laps judge it.
@@ -163,11 +164,6 @@ impl Trace {
             .effect
             .extend(self.answer.settings().iter().map(setup::effect_table));
         config
-    }
-
-    /// Whether the only run there is was fitted and judges too.
-    pub(crate) fn is_judged_by_the_fitted(&self) -> bool {
-        self.judged_by_the_fitted
     }
 
     /// The runs that judge, in words.

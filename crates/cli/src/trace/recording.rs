@@ -244,15 +244,18 @@ impl Recording {
         let of_run = |file: &RunFile| {
             file.rows.log.as_ref()?;
             let t_s = &file.rows.t_s;
-            let missing = |row: usize| ((t_s[row + 1] - t_s[row]) / step_s).round() as usize - 1;
-            let gaps = (0..t_s.len().saturating_sub(1)).filter(|&row| t_s[row + 1] - t_s[row] > 1.5 * step_s);
-            let longest = gaps.clone().max_by_key(|&row| missing(row))?;
-            Some(format!(
-                "{}: {} control steps of this run have no row, {} of them after this one.",
-                file.place(longest),
-                gaps.map(missing).sum::<usize>(),
-                missing(longest)
-            ))
+            let steps = t_s
+                .windows(2)
+                .map(|pair| ((pair[1] - pair[0]) / step_s).round() as usize);
+            let missing: Vec<usize> = steps.map(|steps| steps.saturating_sub(1)).collect();
+            let (row, most) = missing.iter().enumerate().max_by_key(|(_, missing)| **missing)?;
+            (*most > 0).then(|| {
+                format!(
+                    "{}: {} control steps of this run have no row, {most} of them after this one.",
+                    file.place(row),
+                    missing.iter().sum::<usize>()
+                )
+            })
         };
         self.measured.set.runs.iter().filter_map(of_run).collect()
     }

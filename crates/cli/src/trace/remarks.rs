@@ -22,17 +22,25 @@ pub(super) fn sizes_by_run_in_words(answer: &Answer) -> Option<String> {
     })
 }
 
-/// What these data do not allow; `logged` are the logs that are used, and other runs may be held out.
-pub(super) fn remarks(recordings: &[Recording], logged: Option<&Logs>, others_held_out: bool) -> Vec<String> {
+/// What these data do not allow; `logged` are the logs that are used, and the only run may judge what was fitted to it.
+pub(super) fn remarks(
+    recordings: &[Recording],
+    logged: Option<&Logs>,
+    judged_by_the_fitted: bool,
+) -> Vec<String> {
     let mut remarks = Vec::new();
     if runs(recordings).count() == 1 {
-        remarks.push(if others_held_out {
-            "One run only: whether the robot differs from run to run cannot be told; measure a second run.".to_owned()
+        let (error, held_out) = if judged_by_the_fitted {
+            (
+                ", and the error after is that of the very run that was fitted",
+                ", or give one with --held-out",
+            )
         } else {
-            "One run only: whether the robot differs from run to run cannot be told, and the error after is that of \
-             the very run that was fitted; measure a second run, or give one with --held-out."
-                .to_owned()
-        });
+            ("", "")
+        };
+        remarks.push(format!(
+            "One run only: whether the robot differs from run to run cannot be told{error}; measure a second run{held_out}."
+        ));
     }
     for recording in recordings {
         if let Some(unit_m) = recording.written_m {

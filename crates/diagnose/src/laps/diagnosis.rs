@@ -384,4 +384,17 @@ mod tests {
         assert_eq!(diagnosis.answer.verdict, Verdict::Unexplained);
         assert!(diagnosis.answer.explanations.is_empty());
     }
+
+    #[test]
+    fn laps_of_too_few_gates_are_refused() {
+        let few = |effects: &[Setting], set: u64, extent: Extent| {
+            let mut runs = simulated(effects, set, extent)?;
+            for lap in runs.iter_mut().flat_map(|run| &mut run.laps) {
+                lap.seen.offsets_m.truncate(19);
+            }
+            Some(runs)
+        };
+        let made = Atlas::without_effects(&few, &[], true, &|| ());
+        assert_eq!(made.unwrap_err(), Error::TooFewGates { gates: 19, least: 20 });
+    }
 }

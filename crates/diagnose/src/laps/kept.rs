@@ -127,8 +127,19 @@ mod tests {
 
     use super::*;
     use crate::Beginning;
-    use crate::laps::atlas::{Atlas, Extent, NULL_SETS};
+    use crate::laps::atlas::{Atlas, Extent, NULL_SETS, Simulate};
     use crate::laps::testing::simulated;
+
+    /// The declared model itself on trial.
+    fn trial<'a>(atlas: &'a Atlas, simulate: &'a Simulate<'a>) -> Trial<'a> {
+        Trial {
+            atlas,
+            simulate,
+            data: &atlas.null,
+            silent: &[],
+            spent: &atlas.spent,
+        }
+    }
 
     #[test]
     fn what_a_trace_asks_for_is_simulated_once_and_counts_each_time() {
@@ -142,13 +153,7 @@ mod tests {
         let aside = |mm: f64| [Setting::constant(sim::find("wheel-scale").unwrap(), [mm])];
         let asked = |atlas: &Atlas| {
             let before = simulations.load(Ordering::Relaxed);
-            let trial = Trial {
-                atlas,
-                simulate: &counted,
-                data: &atlas.null,
-                silent: &[],
-                spent: &atlas.spent,
-            };
+            let trial = trial(atlas, &counted);
             let found = (
                 trial.kept_action(&aside(2.0), 0),
                 trial.kept_change(&aside(2.0), &Draws::Sets(0..3)),
@@ -175,13 +180,7 @@ mod tests {
     #[test]
     fn first_runs_stand_for_all_and_count_for_themselves() {
         let made = Atlas::without_effects(&simulated, &[], true, &|| ()).unwrap();
-        let trial = Trial {
-            atlas: &made,
-            simulate: &simulated,
-            data: &made.null,
-            silent: &[],
-            spent: &made.spent,
-        };
+        let trial = trial(&made, &simulated);
         let aside = [Setting::constant(sim::find("wheel-scale").unwrap(), [2.0])];
         let before = made.spent();
         let found = trial.simulated_by(&aside, &Draws::FirstRuns(7)).unwrap();
@@ -201,26 +200,15 @@ mod tests {
             let mut stream = sim::Streams { seed: set, run: 1 }.open("beginning");
             if let Some(second) = runs.get_mut(1) {
                 let path: Vec<(f64, Vec2)> = (0..32)
-                    .map(|step| {
-                        (
-                            0.064 * f64::from(step),
-                            0.006 * f64::from(step) + 1e-3 * stream.normal(),
-                        )
-                    })
-                    .map(|(time_s, x_m)| (time_s, Vec2::new(x_m, 0.0)))
+                    .map(f64::from)
+                    .map(|step| (0.064 * step, Vec2::X * (0.006 * step + 1e-3 * stream.normal())))
                     .collect();
                 second.beginning = Beginning::of(&path);
             }
             Some(runs)
         };
         let made = Atlas::without_effects(&second_begins, &[], true, &|| ()).unwrap();
-        let trial = Trial {
-            atlas: &made,
-            simulate: &second_begins,
-            data: &made.null,
-            silent: &[],
-            spent: &made.spent,
-        };
+        let trial = trial(&made, &second_begins);
         let aside = [Setting::constant(sim::find("wheel-scale").unwrap(), [2.0])];
         let found = trial.simulated_by(&aside, &Draws::FirstRuns(7)).unwrap();
         assert_eq!(made.white(&found, &made.null).len(), made.layout.len());

@@ -15,6 +15,7 @@ use super::screen::price;
 use super::simulated::Evaluated;
 use super::tests_of_fit::{Departures, HOPELESS_P, SIGNIFICANT_P};
 use super::trial::Trial;
+use super::verdict::is_noise;
 
 /// What is simulated in a round of a descent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -532,7 +533,7 @@ impl Atlas {
                 part.shape != Shape::Constant && (spec.name == "axle-length" || spec.stage == Stage::Decide);
             let is_known = spec.stage == Stage::Decide;
             let is_quiet =
-                matches!(spec.name, "reading-noise" | "camera-noise") && part.mean_size(self) < HARDLY_ANY;
+                is_noise(spec.name) && spec.stage != Stage::Act && part.mean_size(self) < HARDLY_ANY;
             self.choice(part.probe)
                 + if is_quiet { HARDLY_ANY_NOISE } else { 0.0 }
                 + if is_known { KNOWN_CONSTANT } else { 0.0 }
