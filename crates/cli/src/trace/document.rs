@@ -6,7 +6,7 @@ use sim::Pattern;
 
 use super::Trace;
 use super::answer::{FromLogs, rivals};
-use super::errors::Starts;
+use super::errors::{EQ_8_MODES, Errors, Starts};
 use super::limits::CHANNELS;
 use super::next::Experiment;
 
@@ -27,6 +27,7 @@ pub(crate) fn document(trace: &Trace) -> Value {
             "before": trace.mean_m(|e| &e.before_m), "after": trace.mean_m(|e| &e.after_m),
             "floor": trace.mean_m(|e| &e.floor_m),
             "held_out": if trace.judged_by_the_fitted { Vec::new() } else { trace.held_out().map(|run| run.name.clone()).collect() },
+            "laps": trace.errors.iter().map(laps).collect::<Vec<_>>(),
             "start_of_runs": trace.errors.iter().map(|errors| errors.starts.as_ref().map(starts)).collect::<Vec<_>>(),
         },
         "candidates": answer.explanations.iter().map(|e| candidate(e, trace.laps_alone())).collect::<Vec<_>>(),
@@ -97,6 +98,19 @@ fn channel((measured, channel): (&&str, &Channel)) -> Value {
 
 fn quadratic(q: &Quadratic) -> Value {
     json!({ "q": q.q, "df": q.freedom, "excess": q.excess(), "p": q.p })
+}
+
+/// Lap times, and eq. 8 in some modes, before and after.
+fn laps(errors: &Errors) -> Value {
+    let [before_s, after_s] = errors.simulated_lap_s();
+    let eq_8 = |modes: usize| {
+        let [before, after] = errors.eq_8(modes);
+        json!({ "modes": modes, "before": before, "after": after })
+    };
+    json!({
+        "lap_time_s": { "measured": errors.measured_lap_s(), "before": before_s, "after": after_s },
+        "eq_8": EQ_8_MODES.map(eq_8),
+    })
 }
 
 fn starts(starts: &Starts) -> Value {

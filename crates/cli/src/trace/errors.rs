@@ -20,6 +20,8 @@ const RUNS: u64 = 32;
 const LAPS: usize = 20;
 /// Runs that share a seed.
 const RUNS_PER_SEED: u64 = 4;
+/// Modes of a PDM in which eq. 8 is told.
+pub(crate) const EQ_8_MODES: [usize; 2] = [2, 10];
 /// Seeds of the laps that errors are measured with lie far from those of the fit.
 const SEED_OFFSET: u64 = 1 << 40;
 
@@ -38,6 +40,26 @@ pub(crate) struct Errors {
     pub(crate) floor_m: Vec<f64>,
     /// How runs start, if that is known.
     pub(crate) starts: Option<Starts>,
+}
+
+impl Errors {
+    /// Mean lap time of the held-out laps, s.
+    pub(crate) fn measured_lap_s(&self) -> f64 {
+        let times_s: Vec<f64> = self.held_out.iter().flat_map(SampledRun::lap_times_s).collect();
+        times_s.iter().sum::<f64>() / times_s.len() as f64
+    }
+
+    /// Mean lap times of the simulation before and after, s.
+    pub(crate) fn simulated_lap_s(&self) -> [f64; 2] {
+        [self.before.lap_s(), self.after.lap_s()]
+    }
+
+    /// Eq. 8 between the simulated laps before and after and all held-out ones, in so many modes of a PDM of both; `None` of laps
+    /// that have not so many.
+    pub(crate) fn eq_8(&self, modes: usize) -> [Option<f64>; 2] {
+        let measured: Vec<Vec<f64>> = self.held_out.iter().flat_map(SampledRun::offsets_m).collect();
+        [&self.before, &self.after].map(|laps| distance(laps, &measured, modes))
+    }
 }
 
 /// How runs start on average.
@@ -202,6 +224,16 @@ impl Judged<'_> {
             after,
         }))
     }
+}
+
+/// Eq. 8 between simulated laps and as many measured ones; `None` where it cannot be told in so many modes.
+fn distance(simulated: &MeanLaps, measured_m: &[Vec<f64>], modes: usize) -> Option<f64> {
+    let simulated: Vec<Vec<f64>> = simulated.laps_m().take(measured_m.len()).cloned().collect();
+    let simulated = pdm::Cluster::new("simulated", &simulated).ok()?;
+    let measured = pdm::Cluster::new("measured", measured_m).ok()?;
+    let model = pdm::Pdm::fit([&simulated, &measured]).ok()?;
+    let project = |cluster| model.project(cluster, pdm::Modes::First(modes)).ok();
+    pdm::distance(&project(&simulated)?, &project(&measured)?).ok()
 }
 
 /// How far a run is from the simulations before and after, and from others of the latter by chance, m.

@@ -1,17 +1,17 @@
 //! A trace as a colleague would write it: sections of a report.
 
 use anyhow::Result;
-use diagnose::{Candidate, Cause, Decided, Departures, Explanation, MeanLaps, Quadratic, Verdict};
+use diagnose::{Candidate, Cause, Decided, Departures, Explanation, Quadratic, Verdict};
 use sim::Pattern;
 
 use super::answer::rivals;
 use super::document::distinct;
+use super::errors::EQ_8_MODES;
 use super::limits::{decide_in_words, limits, next_experiment, next_in_words, stages};
 use super::unnamed::{in_words, unnamed};
 use super::{Trace, pictures};
 use crate::experiments::{Block, Picture, Section};
 use crate::figures::MM;
-use crate::laps::SampledRun;
 use crate::table::{Table, four_digits, probability, with_error, with_interval};
 
 /// The sections of a trace.
@@ -256,43 +256,22 @@ fn error_table(trace: &Trace) -> Table {
             mean_mm(&errors.after_m),
             mean_mm(&errors.floor_m),
         ]);
-        let times: Vec<f64> = errors.held_out.iter().flat_map(SampledRun::lap_times_s).collect();
-        let measured_s = times.iter().sum::<f64>() / times.len() as f64;
-        let off = |laps: &MeanLaps| format!("{:+.2}", laps.lap_s() - measured_s);
-        table.push([
-            format!("{of}lap time, s off"),
-            off(&errors.before),
-            off(&errors.after),
-            "0".into(),
-        ]);
+        let measured_s = errors.measured_lap_s();
+        let [before, after] = errors
+            .simulated_lap_s()
+            .map(|s| format!("{:+.2}", s - measured_s));
+        table.push([format!("{of}lap time, s off"), before, after, "0".into()]);
         if let Some(starts) = &errors.starts {
             let [before, after, chance] = starts.errors_mm().map(|mm| format!("{mm:.2}"));
             table.push([format!("{of}start of runs, rms, mm"), before, after, chance]);
         }
-        for modes in [2, 10] {
-            let distance = |laps: &MeanLaps| {
-                distance(laps, &errors.held_out, modes).map_or("-".into(), |d| format!("{d:.2}"))
-            };
-            table.push([
-                format!("{of}eq. 8 in {modes} modes"),
-                distance(&errors.before),
-                distance(&errors.after),
-                "-".into(),
-            ]);
+        for modes in EQ_8_MODES {
+            let distances = errors.eq_8(modes);
+            let [before, after] = distances.map(|d| d.map_or("-".into(), |d| format!("{d:.2}")));
+            table.push([format!("{of}eq. 8 in {modes} modes"), before, after, "-".into()]);
         }
     }
     table
-}
-
-/// Eq. 8 between simulated laps and all held-out laps, in the modes of a PDM of both.
-fn distance(laps: &MeanLaps, runs: &[SampledRun], modes: usize) -> Option<f64> {
-    let measured: Vec<Vec<f64>> = runs.iter().flat_map(SampledRun::offsets_m).collect();
-    let simulated: Vec<Vec<f64>> = laps.laps_m().take(measured.len()).cloned().collect();
-    let simulated = pdm::Cluster::new("simulated", &simulated).ok()?;
-    let measured = pdm::Cluster::new("measured", &measured).ok()?;
-    let model = pdm::Pdm::fit([&simulated, &measured]).ok()?;
-    let project = |cluster| model.project(cluster, pdm::Modes::First(modes)).ok();
-    pdm::distance(&project(&simulated)?, &project(&measured)?).ok()
 }
 
 fn residual(trace: &Trace) -> Vec<Block> {
