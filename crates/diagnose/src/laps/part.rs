@@ -165,16 +165,6 @@ impl Part {
         more.then(|| Self::screened(atlas, number, Shape::Constant, &[size]))
     }
 
-    /// The same at the other sensors; none of what acts on all.
-    pub(super) fn at_other_sensors(&self, atlas: &Atlas) -> Vec<Self> {
-        let own = &atlas.probes[self.probe];
-        let size = self.mean_size(atlas);
-        (atlas.probes.iter().enumerate())
-            .filter(|(_, other)| other.is_at_other_sensor(own))
-            .map(|(number, _)| Self::screened(atlas, number, Shape::Constant, &[size]))
-            .collect()
-    }
-
     /// A group of basis functions at multiples of its steps.
     pub(super) fn group(probe: &Probe, number: usize, multiples: &[f64]) -> Self {
         let mut values = probe.origin().to_vec();

@@ -70,6 +70,9 @@ pub(super) const ROUNDS_BESIDE: [Rung; 6] = [
     rung(Round::Full, 15.0, 0.0001),
 ];
 
+/// The same of what may be listed but hardly claimed.
+pub(super) const ROUNDS_OF_LITTLE: [Rung; 3] = [ROUNDS_BESIDE[0], ROUNDS_BESIDE[1], ROUNDS_BESIDE[2]];
+
 /// The same for hypotheses of many numbers that are linear in what they do.
 pub(super) const ROUNDS_OF_GROUPS: [Rung; 2] =
     [rung(Round::Rough, 30.0, 0.05), rung(Round::Full, 20.0, 0.015)];
@@ -138,11 +141,12 @@ impl Search<'_> {
                 let others = alive.split_off(FEW.min(alive.len()));
                 alive.extend(others.into_iter().filter(|other| may_catch_up(other, best)));
             }
-            if hopeless && round == Round::Full {
-                break;
-            }
             if hopeless {
                 alive.truncate(FEW);
+                // What is only begun may still come to something.
+                if round == Round::Full || alive.iter().all(is_hopeless) {
+                    break;
+                }
             }
         }
         alive
@@ -304,7 +308,6 @@ impl Search<'_> {
     /// Simulates the best hypothesis more often, and still more if others explain nearly as much; not if it leaves far too much, or
     /// surely something and is not to be claimed.
     fn closer(&self, settled: Vec<Settled>) -> Vec<Settled> {
-        const CLOSE: f64 = 10.0;
         const CLOSE_SETS_OF_ALL: u64 = 240;
         /// Laps of a data set of which that many are simulated; of smaller ones more, in the same time.
         const USUAL_LAPS: u64 = 80;
@@ -313,20 +316,35 @@ impl Search<'_> {
         if first.is_some_and(|first| is_no_answer(&self.found(first).explanation)) {
             return settled;
         }
-        let error = |s: &Settled| s.refined.fit.gain_error;
-        let best_error = first.map_or(0.0, error);
-        let behind = |s: &Settled| CLOSE.max(ERRORS * best_error.hypot(error(s)));
-        let (close, mut others): (Vec<_>, Vec<_>) =
-            (settled.into_iter()).partition(|s| s.refined.score > best - behind(s));
         let smaller = (USUAL_LAPS / self.atlas().layout.total_laps() as u64).max(1);
-        let sets = match close.len() as u64 {
-            0 | 1 => FINAL_SETS,
-            rivals => (smaller * CLOSE_SETS_OF_ALL / rivals).clamp(FINAL_SETS, smaller * CLOSE_SETS),
-        };
-        let sets = self.atlas().enough(sets, 1);
-        others.extend(self.trial.settle_rivals(close, sets));
+        let (close, mut others) = close_and_others(settled);
+        let again = self
+            .trial
+            .settle_rivals(close, self.atlas().enough(FINAL_SETS, 1));
+        let (close, further) = close_and_others(again);
+        others.extend(further);
+        let rivals = close.len() as u64;
+        if rivals < 2 {
+            others.extend(close);
+            return others;
+        }
+        let sets = (smaller * CLOSE_SETS_OF_ALL / rivals).clamp(FINAL_SETS, smaller * CLOSE_SETS);
+        others.extend(self.trial.settle_rivals(close, self.atlas().enough(sets, 1)));
         others
     }
+}
+
+/// Hypotheses that are near the best as far as these simulations tell, and the others.
+fn close_and_others(settled: Vec<Settled>) -> (Vec<Settled>, Vec<Settled>) {
+    const CLOSE: f64 = 10.0;
+    let score = |s: &Settled| (s.refined.score, s.refined.fit.gain_error);
+    let best = settled.iter().map(score).max_by(|a, b| a.0.total_cmp(&b.0));
+    let (best, best_error) = best.unwrap_or_default();
+    let is_close = |s: &Settled| {
+        let (score, error) = score(s);
+        score > best - CLOSE.max(ERRORS * best_error.hypot(error))
+    };
+    settled.into_iter().partition(is_close)
 }
 
 /// Progress of a round, as a share of what is missing, with which a descent does not arrive.

@@ -12,7 +12,7 @@ use super::atlas::{Atlas, White};
 use super::hypothesis::Hypothesis;
 use super::intervals::Interval;
 use super::observed::ObservedRun;
-use super::part::{Freedom, Shape};
+use super::part::{Freedom, Part, Shape};
 use super::pieces::ScreenedPair;
 use super::refine::{Descent, Settled};
 use super::ripple::Ripple;
@@ -20,6 +20,7 @@ use super::rounds::{
     ERRORS, ROUNDS, ROUNDS_BESIDE, ROUNDS_FROM_NEAR, ROUNDS_OF_GROUPS, ROUNDS_OF_SEVERAL, Rung, best_of, near,
 };
 use super::scans::Scan;
+use super::screen::Screened;
 use super::steadiness::Settling;
 use super::tests_of_fit::{Departures, Quadratic, SIGNIFICANT_P};
 use super::trial::Trial;
@@ -189,8 +190,8 @@ impl Search<'_> {
         for near in found.iter().take(MOST).filter(|found| score(found) > best - NEAR) {
             for (i, part) in near.hypothesis.parts.iter().enumerate() {
                 let rest = near.hypothesis.without(i);
-                for other in part.at_other_sensors(self.atlas()) {
-                    let start = rest.with(&Hypothesis::of(other));
+                for other in self.screened_at_other_sensors(part, &rest) {
+                    let start = rest.with(&other);
                     let mut known = found.iter().map(|found| &found.hypothesis).chain(&starts);
                     if !known.any(|known| known.probes() == start.probes()) {
                         starts.push(start);
@@ -204,6 +205,30 @@ impl Search<'_> {
         let mut descents = self.descend(starts.iter(), rounds, best);
         descents.retain(|descent| descent.score > best - BEHIND.max(ERRORS * descent.score_error));
         self.settle_near(descents)
+    }
+
+    /// The effect of a part at the other sensors where it may win by what it explains, beside some effects, of what these leave; none of
+    /// what acts on all.
+    fn screened_at_other_sensors(&self, part: &Part, others: &Hypothesis) -> Vec<Hypothesis> {
+        const SHARE: f64 = 0.7;
+        let probes = &self.atlas().probes;
+        let own = &probes[part.probe];
+        if !probes.iter().any(|probe| probe.is_at_other_sensor(own)) {
+            return Vec::new();
+        }
+        let Some(left) = self.left_by(others) else {
+            return Vec::new();
+        };
+        let mut screened = self.atlas().screen(&left);
+        let probe_of = |s: &Screened| &probes[s.hypothesis.parts[0].probe];
+        screened.retain(|s| s.hypothesis.is_constant() && probe_of(s).spec == own.spec);
+        let Some(best) = screened.first() else {
+            return Vec::new();
+        };
+        (screened.iter())
+            .filter(|s| probe_of(s).is_at_other_sensor(own) && s.score > 0.0 && s.may_win(best, SHARE))
+            .map(|s| s.hypothesis.clone())
+            .collect()
     }
 
     /// Explanations with what explains best what they leave beside them, tried to the end.

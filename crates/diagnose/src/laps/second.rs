@@ -3,7 +3,7 @@
 use super::hunt::Moved;
 use super::hypothesis::Hypothesis;
 use super::pairs::Tried;
-use super::rounds::ROUNDS_BESIDE;
+use super::rounds::{ROUNDS_BESIDE, ROUNDS_OF_LITTLE};
 use super::screen::Screened;
 use super::search::{Found, Search};
 use super::verdict::{faults_beside, stands_alone, suffices};
@@ -43,7 +43,7 @@ impl Search<'_> {
                 // Sizes that jump are rough.
                 Promise::Little(_) if jumps => {}
                 Promise::Little(pairs) => {
-                    let descents = self.descend(pairs.iter(), &ROUNDS_BESIDE, f64::NEG_INFINITY);
+                    let descents = self.descend(pairs.iter(), &ROUNDS_OF_LITTLE, f64::NEG_INFINITY);
                     return self.settle_roughly(descents);
                 }
                 Promise::Enough(pairs) => {
