@@ -10,7 +10,6 @@ use super::expectation::{Expectation, Scatter};
 use super::hypothesis::Hypothesis;
 use super::parabola::groups;
 use super::part::{Freedom, Part};
-use super::refine::Descent;
 use super::screen::{Screened, without_directions};
 use super::search::{Search, WEAK};
 use super::simulated::Draws;
@@ -246,14 +245,13 @@ impl Search<'_> {
         all
     }
 
-    /// A pair with either effect exchanged for those that explain best what the other one leaves, but for those pairs that
-    /// were tried: actions do not quite add up, and of effects that do about the same the best few were tried.
-    pub(super) fn exchanged(&self, pair: &Descent, tried: &[Hypothesis]) -> Vec<Hypothesis> {
+    /// Effects with those that explain best what each of them leaves, but for those pairs that were tried: actions do not quite add up,
+    /// and of effects that do about the same the best few were tried.
+    pub(super) fn beside_each(&self, effects: &[Hypothesis], tried: &[Hypothesis]) -> Vec<Hypothesis> {
         let mut all = tried.to_vec();
-        for kept in &pair.hypothesis.parts {
-            let alone = Hypothesis::of(kept.clone());
-            if let Some(left) = self.left_by(&alone) {
-                let base = self.trial.base(alone);
+        for alone in effects {
+            if let Some(left) = self.left_by(alone) {
+                let base = self.trial.base(alone.clone());
                 let others = self.beside(&base, &left, &all);
                 all.extend(others);
             }

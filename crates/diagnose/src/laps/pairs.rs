@@ -13,6 +13,9 @@ use super::screen::tangent;
 use super::search::{BASES, Found, NEARLY_ALL, STRONG, Search, of_other_effects};
 use super::simulated::Draws;
 
+/// Log-likelihood by which pairs may be behind the best, and either be the right one.
+const NEAR_THE_BEST: f64 = 6.0;
+
 /// Hypotheses of several effects that were descended from, and where that led.
 pub(super) struct Tried {
     rounds: &'static [Rung],
@@ -161,22 +164,51 @@ impl Search<'_> {
         tried.starts.extend(further);
     }
 
-    /// Pairs with either effect of the best one exchanged for others than were tried, tried to the end.
+    /// Pairs with either effect of the best one exchanged for others than were tried, and then the effects that were not kept so far of
+    /// those that come near it, tried to the end.
     pub(super) fn with_exchanged(&self, mut tried: Tried) -> Vec<Found> {
         // What is no better than fewer effects lacks none.
         let may_be_better = |best: &Descent| best.score + ERRORS * best.score_error > tried.reached;
         if !best_of(&tried.descents).is_some_and(may_be_better) {
             return Vec::new();
         }
-        // What leaves far too much lacks a third effect rather than another second one.
-        let lacks_none = |best: &&Descent| !best.leaves_far_too_much();
-        if let Some(best) = best_of(&tried.descents).filter(lacks_none) {
-            let names = self.in_words(std::slice::from_ref(best));
-            self.tell(format_args!("what else goes with either of {names}"));
-            let exchanged = self.exchanged(best, &tried.starts);
+        let mut kept: Vec<Part> = Vec::new();
+        for near in [0.0, NEAR_THE_BEST] {
+            let keep = self.worth_keeping(&tried.descents, near, &kept);
+            if keep.is_empty() {
+                break;
+            }
+            let alone: Vec<Hypothesis> = keep.iter().cloned().map(Hypothesis::of).collect();
+            let names: Vec<&str> = (keep.iter())
+                .map(|part| self.atlas().probes[part.probe].spec.name)
+                .collect();
+            self.tell(format_args!("what else goes with {}", names.join(" or ")));
+            let exchanged = self.beside_each(&alone, &tried.starts);
             self.descend_on(&mut tried, exchanged);
+            kept.extend(keep);
         }
         self.settle(tried.descents)
+    }
+
+    /// The effects of the best descent and of others that are so near it, but for those that do about what others do that were kept
+    /// already: none where the best leaves far too much, which lacks a third effect rather than another second one.
+    fn worth_keeping(&self, descents: &[Descent], near: f64, kept: &[Part]) -> Vec<Part> {
+        const MOST: usize = 2;
+        let Some(best) = best_of(descents).filter(|best| !best.leaves_far_too_much()) else {
+            return Vec::new();
+        };
+        let mut near: Vec<&Descent> = (descents.iter())
+            .filter(|descent| descent.score >= best.score - near)
+            .collect();
+        near.sort_by(|a, b| b.score.total_cmp(&a.score));
+        let mut keep: Vec<Part> = Vec::new();
+        for part in near.iter().flat_map(|descent| &descent.hypothesis.parts) {
+            let mut known = kept.iter().chain(&keep);
+            if keep.len() < MOST && !known.any(|known| self.atlas().do_alike(part, known)) {
+                keep.push(part.clone());
+            }
+        }
+        keep
     }
 
     /// Pairs that were screened with the scores and sizes that simulations of both together give them, best first: actions do not quite

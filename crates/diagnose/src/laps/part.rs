@@ -7,6 +7,7 @@ use sim::{Pattern, Setting};
 use super::atlas::Atlas;
 use super::intervals::Interval;
 use super::probe::{Probe, other_at_place};
+use super::screen::at;
 use crate::candidate::apart;
 use crate::slip::{level_of, memory_of};
 
@@ -411,6 +412,23 @@ impl Part {
             });
         }
         freedoms
+    }
+}
+
+impl Atlas {
+    /// Whether two parts do about the same, as far as their paths tell: at their mean sizes, whatever these are.
+    pub(super) fn do_alike(&self, one: &Part, other: &Part) -> bool {
+        /// Cosine of the angle between their actions.
+        const ALIKE: f64 = 0.95;
+        let action = |part: &Part| {
+            let nodes = self.nodes(part.probe);
+            (!nodes.is_empty()).then(|| at(&nodes, part.mean_size(self)))
+        };
+        match (action(one), action(other)) {
+            (Some(one), Some(other)) => one.dot(&other).abs() >= ALIKE * one.norm() * other.norm(),
+            // What jumps has no path.
+            _ => one.probe == other.probe,
+        }
     }
 }
 

@@ -224,7 +224,7 @@ impl Trial<'_> {
             Round::Rough => false,
             // A place is not found on one parabola, nor a far one on two.
             Round::Again => !has_place || descent.holds && descent.looks > 1,
-            Round::Full => !has_place && descent.knows_its_slopes(),
+            Round::Full => descent.knows_its_slopes() && (!has_place || descent.looks > 2),
         };
         if again && descent.near.is_some() {
             self.look_again(descent, round)
