@@ -35,6 +35,11 @@ impl Tried {
         }
     }
 
+    /// Where descents led.
+    pub(super) fn descents(&self) -> &[Descent] {
+        &self.descents
+    }
+
     /// Whether the best leaves nothing significant.
     pub(super) fn fits(&self) -> bool {
         best_of(&self.descents).is_some_and(Descent::fits)

@@ -6,7 +6,7 @@ use super::pairs::Tried;
 use super::rounds::{ROUNDS_BESIDE, ROUNDS_OF_LITTLE};
 use super::screen::Screened;
 use super::search::{Found, Search};
-use super::verdict::{faults_beside, stands_alone, suffices};
+use super::verdict::{faults_beside, is_worth_its_numbers, stands_alone, suffices};
 
 /// What could go with a single effect, by what it explains of that one's remainder.
 enum Promise {
@@ -52,6 +52,15 @@ impl Search<'_> {
                         return self.pairs_with_first(found);
                     }
                     self.descend_on(&mut tried, pairs);
+                    if stands_alone(&single.explanation) {
+                        // What is not worth its numbers lacks no other name.
+                        let ends = self.settle_roughly(tried.descents().to_vec());
+                        let is_worth_it =
+                            |pair: &Found| is_worth_its_numbers(&single.explanation, &pair.explanation);
+                        if !ends.iter().any(is_worth_it) {
+                            return ends;
+                        }
+                    }
                     if !jumps && surely_lacks && !tried.fits() {
                         self.descend_on(&mut tried, self.jumping_beside(found.iter()));
                     }

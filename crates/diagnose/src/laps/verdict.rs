@@ -145,20 +145,32 @@ pub(super) fn preferred(fewer: Vec<Found>, more: Vec<Found>) -> Vec<Found> {
         return if fewer.is_empty() { more } else { fewer };
     };
     let (a, b) = (&first.explanation, &further.explanation);
-    let numbers = b.fitted().saturating_sub(a.fitted());
-    // Patterns have a price of their own, which tells where as many numbers were fitted.
-    let gained = if numbers == 0 {
-        b.score - a.score
-    } else {
-        b.gain - a.gain
-    };
+    let (gained, numbers) = gained_by(a, b);
     // Noise that is too large covers what it does not explain.
     let covered = if noises(a) > 0 { AS_GOOD } else { 0.0 };
     let better = b.fits() || b.share >= ALL_BUT || !suffices(a) && b.share > a.share - covered;
     let worth = if suffices(a) { WORTH_BESIDE } else { WORTH };
     let faults = if b.fits() { faults_beside(a) } else { a.faults() };
-    let wins = gained > faults.max(worth * numbers.max(1) as f64) && better && !heaps_noise(b);
+    let wins = gained > faults.max(worth * numbers) && better && !heaps_noise(b);
     with_first(wins, more, fewer)
+}
+
+/// Whether a further effect gains what one is worth that comes after an explanation which leaves something.
+pub(super) fn is_worth_its_numbers(fewer: &Explanation, more: &Explanation) -> bool {
+    let (gained, numbers) = gained_by(fewer, more);
+    gained > WORTH * numbers
+}
+
+/// What more effects gain over fewer, and the number of numbers that it takes, one at least.
+fn gained_by(fewer: &Explanation, more: &Explanation) -> (f64, f64) {
+    let numbers = more.fitted().saturating_sub(fewer.fitted());
+    // Patterns have a price of their own, which tells where as many numbers were fitted.
+    let gained = if numbers == 0 {
+        more.score - fewer.score
+    } else {
+        more.gain - fewer.gain
+    };
+    (gained, numbers.max(1) as f64)
 }
 
 /// What the faults of models may gain beside an explanation: more effects that fit must gain more if it stands without them.
