@@ -426,7 +426,7 @@ impl Atlas {
         };
         match (action(one), action(other)) {
             (Some(one), Some(other)) => one.dot(&other).abs() >= ALIKE * one.norm() * other.norm(),
-            // What jumps has no path.
+            // Of what was simulated at no size the same alone is known.
             _ => one.probe == other.probe,
         }
     }
@@ -435,4 +435,27 @@ impl Atlas {
 /// Time at which a run's laps are half done: the kept ones begin one and a half laps after the run, on average.
 fn middle_s(atlas: &Atlas) -> f64 {
     (1.5 + atlas.run_laps() / 2.0) * atlas.lap_s()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::laps::probe::probes;
+    use crate::laps::testing::simulated;
+
+    #[test]
+    fn effects_that_put_a_robot_aside_do_alike() {
+        let mut known = probes(0.032);
+        known.retain(|probe| ["wheel-scale", "axle-length"].contains(&probe.spec.name));
+        let mut atlas = Atlas::with_probes(&simulated, &[], true, known, &|| ()).unwrap();
+        let [one, other] = [0, 1].map(|probe| Part::screened(&atlas, probe, Shape::Constant, &[5.0]));
+        assert!(atlas.do_alike(&one, &other));
+        // The other puts the first run to the other side.
+        let first = atlas.layout.run(0);
+        for action in atlas.paths[1].iter_mut().flatten() {
+            action.rows_mut(first.start, first.len()).scale_mut(-1.0);
+        }
+        assert!(!atlas.do_alike(&one, &other));
+        assert!(atlas.do_alike(&other, &other));
+    }
 }

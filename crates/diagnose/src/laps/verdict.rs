@@ -330,6 +330,15 @@ mod tests {
     }
 
     #[test]
+    fn a_further_effect_is_worth_ten_units_a_number() {
+        let one = by(&["wheel-scale"], 0.3, 0.99, 500.0);
+        for (score, worth) in [(509.0, false), (511.0, true)] {
+            let two = by(&["wheel-scale", "reading-gain"], 0.3, 0.99, score);
+            assert_eq!(is_worth_its_numbers(&one, &two), worth, "{score}");
+        }
+    }
+
+    #[test]
     fn effects_on_noise_do_not_heap_up() {
         let noises = by(&["slip-level", "camera-noise"], 0.5, 1.0, 500.0);
         assert_eq!(verdict_of(&noises), Verdict::Unexplained);
