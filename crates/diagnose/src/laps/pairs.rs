@@ -40,6 +40,11 @@ impl Tried {
         &self.descents
     }
 
+    /// Whether the best may be better than what was reached without them.
+    fn may_be_better(&self) -> bool {
+        best_of(&self.descents).is_some_and(|best| best.score + ERRORS * best.score_error > self.reached)
+    }
+
     /// Whether the best leaves nothing significant.
     pub(super) fn fits(&self) -> bool {
         best_of(&self.descents).is_some_and(Descent::fits)
@@ -132,7 +137,7 @@ impl Search<'_> {
     }
 
     /// Adds the best of the pairs that are looked for together, from which is descended once.
-    fn try_together(&self, tried: &mut Tried) {
+    pub(super) fn try_together(&self, tried: &mut Tried) {
         const PAIRS: usize = 5;
         let best = self.together().iter().take(PAIRS);
         let best: Vec<Hypothesis> = best.map(|pair| pair.hypothesis.clone()).collect();
@@ -169,13 +174,27 @@ impl Search<'_> {
         tried.starts.extend(further);
     }
 
-    /// Pairs with either effect of the best one exchanged for others than were tried, and then the effects that were not kept so far of
-    /// those that come near it, tried to the end.
+    /// Pairs after [`Search::exchange`], tried to the end.
     pub(super) fn with_exchanged(&self, mut tried: Tried) -> Vec<Found> {
-        // What is no better than fewer effects lacks none.
-        let may_be_better = |best: &Descent| best.score + ERRORS * best.score_error > tried.reached;
-        if !best_of(&tried.descents).is_some_and(may_be_better) {
-            return Vec::new();
+        self.exchange(&mut tried);
+        self.settle_tried(tried)
+    }
+
+    /// Pairs tried to the end, if the best may be better than what was reached without them: what is no better than fewer effects lacks
+    /// none.
+    pub(super) fn settle_tried(&self, tried: Tried) -> Vec<Found> {
+        if tried.may_be_better() {
+            self.settle(tried.descents)
+        } else {
+            Vec::new()
+        }
+    }
+
+    /// Adds pairs with either effect of the best one exchanged for others than were tried, and then the effects that were not kept so far
+    /// of those that come near it.
+    fn exchange(&self, tried: &mut Tried) {
+        if !tried.may_be_better() {
+            return;
         }
         let mut kept: Vec<Part> = Vec::new();
         for near in [0.0, NEAR_THE_BEST] {
@@ -189,10 +208,9 @@ impl Search<'_> {
                 .collect();
             self.tell(format_args!("what else goes with {}", names.join(" or ")));
             let exchanged = self.beside_each(&alone, &tried.starts);
-            self.descend_on(&mut tried, exchanged);
+            self.descend_on(tried, exchanged);
             kept.extend(keep);
         }
-        self.settle(tried.descents)
     }
 
     /// The effects of the best descent and of others that are so near it, but for those that do about what others do that were kept

@@ -3,9 +3,9 @@
 use super::hunt::Moved;
 use super::hypothesis::Hypothesis;
 use super::pairs::Tried;
-use super::rounds::{ROUNDS_BESIDE, ROUNDS_OF_LITTLE};
+use super::rounds::{ROUNDS_BESIDE, ROUNDS_OF_LITTLE, ROUNDS_OF_SEVERAL};
 use super::screen::Screened;
-use super::search::{Found, Search};
+use super::search::{Found, Search, sort};
 use super::verdict::{faults_beside, is_worth_its_numbers, stands_alone, suffices};
 
 /// What could go with a single effect, by what it explains of that one's remainder.
@@ -25,10 +25,8 @@ impl Search<'_> {
         let Some(single) = found.first() else {
             return Vec::new();
         };
-        let mut tried = Tried::new(
-            &ROUNDS_BESIDE,
-            single.explanation.score + fair_share_of_faults(single),
-        );
+        let reached = single.explanation.score + fair_share_of_faults(single);
+        let mut tried = Tried::new(&ROUNDS_BESIDE, reached);
         let jumps = self.jumps(&single.hypothesis);
         let surely_lacks = !suffices(&single.explanation);
         if jumps && surely_lacks {
@@ -67,7 +65,16 @@ impl Search<'_> {
                 }
             }
         }
-        self.with_exchanged(tried)
+        let mut pairs = self.with_exchanged(tried);
+        let fits = |pair: &Found| pair.explanation.fits();
+        if surely_lacks && self.is_strong() && !pairs.first().is_some_and(fits) {
+            // Two effects that have nothing of the single one may do together what it does nearly.
+            let mut tried = Tried::new(&ROUNDS_OF_SEVERAL, reached);
+            self.try_together(&mut tried);
+            pairs.extend(self.settle_tried(tried));
+            sort(&mut pairs);
+        }
+        pairs
     }
 
     /// What explains best what a single effect leaves, if anything gains there what a further effect must, and a fair share of what the
