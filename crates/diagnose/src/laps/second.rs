@@ -6,7 +6,7 @@ use super::pairs::Tried;
 use super::rounds::{ROUNDS_BESIDE, ROUNDS_OF_LITTLE, ROUNDS_OF_SEVERAL};
 use super::screen::Screened;
 use super::search::{Found, Search, sort};
-use super::verdict::{faults_beside, is_worth_its_numbers, stands_alone, suffices};
+use super::verdict::{ALL_BUT_FAULTS, faults_beside, is_worth_its_numbers, stands_alone, suffices};
 
 /// What could go with a single effect, by what it explains of that one's remainder.
 enum Promise {
@@ -67,7 +67,8 @@ impl Search<'_> {
         }
         let mut pairs = self.with_exchanged(tried);
         let fits = |pair: &Found| pair.explanation.fits();
-        if surely_lacks && self.is_strong() && !pairs.first().is_some_and(fits) {
+        let may_be_faults = single.explanation.share >= ALL_BUT_FAULTS;
+        if surely_lacks && !may_be_faults && self.is_strong() && !pairs.first().is_some_and(fits) {
             // Two effects that have nothing of the single one may do together what it does nearly.
             let mut tried = Tried::new(&ROUNDS_OF_SEVERAL, reached);
             self.try_together(&mut tried);
