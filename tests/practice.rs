@@ -67,6 +67,18 @@ fn a_stretched_picture_is_named() {
     says(&trace, "explained", &["camera-scale"]);
     holds(&trace["effects"][0], "factor", 1.012_07, 1.0);
     helps(&trace);
+    // The camera does not change how fast the robot is, but where it is seen.
+    let laps = &trace["error"]["laps"][0];
+    println!("{laps}");
+    let [measured_s, before_s, after_s] =
+        ["measured", "before", "after"].map(|key| laps["lap_time_s"][key].as_f64().unwrap());
+    assert!((before_s - after_s).abs() < 0.1 && (after_s - measured_s).abs() < 1.0);
+    let eq_8 = laps["eq_8"].as_array().unwrap();
+    assert_eq!(eq_8.len(), 2);
+    for in_modes in eq_8 {
+        let [before, after] = ["before", "after"].map(|key| in_modes[key].as_f64().unwrap());
+        assert!(after < 0.2 * before, "{laps}");
+    }
 }
 
 #[test]
