@@ -65,11 +65,17 @@ impl Search<'_> {
                 }
             }
         }
-        let mut pairs = self.with_exchanged(tried);
+        let pairs = self.with_exchanged(tried);
+        self.with_pairs_without(single, reached, pairs)
+    }
+
+    /// Pairs, those that go with a single effect; where none of them fits and that one surely leaves something of a strong signal, the
+    /// pairs that are looked for together too: two effects that have nothing of the single one may do together what it does nearly.
+    fn with_pairs_without(&self, single: &Found, reached: f64, mut pairs: Vec<Found>) -> Vec<Found> {
+        let single = &single.explanation;
+        let lacks_more_than_faults = !suffices(single) && single.share < ALL_BUT_FAULTS;
         let fits = |pair: &Found| pair.explanation.fits();
-        let may_be_faults = single.explanation.share >= ALL_BUT_FAULTS;
-        if surely_lacks && !may_be_faults && self.is_strong() && !pairs.first().is_some_and(fits) {
-            // Two effects that have nothing of the single one may do together what it does nearly.
+        if lacks_more_than_faults && self.is_strong() && !pairs.first().is_some_and(fits) {
             let mut tried = Tried::new(&ROUNDS_OF_SEVERAL, reached);
             self.try_together(&mut tried);
             pairs.extend(self.settle_tried(tried));
