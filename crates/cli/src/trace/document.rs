@@ -6,7 +6,7 @@ use sim::Pattern;
 
 use super::Trace;
 use super::answer::{FromLogs, rivals};
-use super::errors::{EQ_8_MODES, Errors, Starts};
+use super::errors::{Eq8, Errors, Starts};
 use super::limits::CHANNELS;
 use super::next::Experiment;
 
@@ -103,13 +103,10 @@ fn quadratic(q: &Quadratic) -> Value {
 /// Lap times, and eq. 8 in some modes, before and after.
 fn laps(errors: &Errors) -> Value {
     let [before_s, after_s] = errors.simulated_lap_s();
-    let eq_8 = |modes: usize| {
-        let [before, after] = errors.eq_8(modes);
-        json!({ "modes": modes, "before": before, "after": after })
-    };
+    let eq_8 = |eq_8: Eq8| json!({ "modes": eq_8.modes, "before": eq_8.before, "after": eq_8.after });
     json!({
         "lap_time_s": { "measured": errors.measured_lap_s(), "before": before_s, "after": after_s },
-        "eq_8": EQ_8_MODES.map(eq_8),
+        "eq_8": errors.eq_8().map(eq_8),
     })
 }
 

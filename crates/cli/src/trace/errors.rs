@@ -21,7 +21,7 @@ const LAPS: usize = 20;
 /// Runs that share a seed.
 const RUNS_PER_SEED: u64 = 4;
 /// Modes of a PDM in which eq. 8 is told.
-pub(crate) const EQ_8_MODES: [usize; 2] = [2, 10];
+const EQ_8_MODES: [usize; 2] = [2, 10];
 /// Seeds of the laps that errors are measured with lie far from those of the fit.
 const SEED_OFFSET: u64 = 1 << 40;
 
@@ -54,12 +54,24 @@ impl Errors {
         [self.before.lap_s(), self.after.lap_s()]
     }
 
-    /// Eq. 8 between the simulated laps before and after and all held-out ones, in so many modes of a PDM of both; `None` of laps
-    /// that have not so many.
-    pub(crate) fn eq_8(&self, modes: usize) -> [Option<f64>; 2] {
+    /// Eq. 8 between the simulated laps before and after and all held-out ones.
+    pub(crate) fn eq_8(&self) -> [Eq8; 2] {
         let measured: Vec<Vec<f64>> = self.held_out.iter().flat_map(SampledRun::offsets_m).collect();
-        [&self.before, &self.after].map(|laps| distance(laps, &measured, modes))
+        let [before, after] = [&self.before, &self.after].map(|laps| eq_8(laps, &measured));
+        [0, 1].map(|i| Eq8 {
+            modes: EQ_8_MODES[i],
+            before: before[i],
+            after: after[i],
+        })
     }
+}
+
+/// Eq. 8 in some modes of a PDM of simulated and measured laps; `None` of laps that have not so many.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Eq8 {
+    pub(crate) modes: usize,
+    pub(crate) before: Option<f64>,
+    pub(crate) after: Option<f64>,
 }
 
 /// How runs start on average.
@@ -226,14 +238,22 @@ impl Judged<'_> {
     }
 }
 
-/// Eq. 8 between simulated laps and as many measured ones; `None` where it cannot be told in so many modes.
-fn distance(simulated: &MeanLaps, measured_m: &[Vec<f64>], modes: usize) -> Option<f64> {
-    let simulated: Vec<Vec<f64>> = simulated.laps_m().take(measured_m.len()).cloned().collect();
-    let simulated = pdm::Cluster::new("simulated", &simulated).ok()?;
-    let measured = pdm::Cluster::new("measured", measured_m).ok()?;
-    let model = pdm::Pdm::fit([&simulated, &measured]).ok()?;
-    let project = |cluster| model.project(cluster, pdm::Modes::First(modes)).ok();
-    pdm::distance(&project(&simulated)?, &project(&measured)?).ok()
+/// Eq. 8 between simulated laps and as many measured ones, in [`EQ_8_MODES`]; `None` where it cannot be told.
+fn eq_8(simulated: &MeanLaps, measured_m: &[Vec<f64>]) -> [Option<f64>; 2] {
+    let fit = || {
+        let simulated: Vec<Vec<f64>> = simulated.laps_m().take(measured_m.len()).cloned().collect();
+        let simulated = pdm::Cluster::new("simulated", &simulated).ok()?;
+        let measured = pdm::Cluster::new("measured", measured_m).ok()?;
+        let model = pdm::Pdm::fit([&simulated, &measured]).ok()?;
+        Some((model, simulated, measured))
+    };
+    let Some((model, simulated, measured)) = fit() else {
+        return [None; 2];
+    };
+    EQ_8_MODES.map(|modes| {
+        let project = |cluster| model.project(cluster, pdm::Modes::First(modes)).ok();
+        pdm::distance(&project(&simulated)?, &project(&measured)?).ok()
+    })
 }
 
 /// How far a run is from the simulations before and after, and from others of the latter by chance, m.

@@ -6,7 +6,7 @@ use sim::Pattern;
 
 use super::answer::rivals;
 use super::document::distinct;
-use super::errors::EQ_8_MODES;
+use super::errors::Eq8;
 use super::limits::{decide_in_words, limits, next_experiment, next_in_words, stages};
 use super::unnamed::{in_words, unnamed};
 use super::{Trace, pictures};
@@ -265,9 +265,8 @@ fn error_table(trace: &Trace) -> Table {
             let [before, after, chance] = starts.errors_mm().map(|mm| format!("{mm:.2}"));
             table.push([format!("{of}start of runs, rms, mm"), before, after, chance]);
         }
-        for modes in EQ_8_MODES {
-            let distances = errors.eq_8(modes);
-            let [before, after] = distances.map(|d| d.map_or("-".into(), |d| format!("{d:.2}")));
+        for Eq8 { modes, before, after } in errors.eq_8() {
+            let [before, after] = [before, after].map(|d| d.map_or("-".into(), |d| format!("{d:.2}")));
             table.push([format!("{of}eq. 8 in {modes} modes"), before, after, "-".into()]);
         }
     }

@@ -247,11 +247,12 @@ impl Search<'_> {
 
     /// Effects with those that explain best what each of them leaves, but for those pairs that were tried: actions do not quite add up,
     /// and of effects that do about the same the best few were tried.
-    pub(super) fn beside_each(&self, effects: &[Hypothesis], tried: &[Hypothesis]) -> Vec<Hypothesis> {
+    pub(super) fn beside_each(&self, effects: &[Part], tried: &[Hypothesis]) -> Vec<Hypothesis> {
         let mut all = tried.to_vec();
-        for alone in effects {
-            if let Some(left) = self.left_by(alone) {
-                let base = self.trial.base(alone.clone());
+        for effect in effects {
+            let alone = Hypothesis::of(effect.clone());
+            if let Some(left) = self.left_by(&alone) {
+                let base = self.trial.base(alone);
                 let others = self.beside(&base, &left, &all);
                 all.extend(others);
             }

@@ -13,9 +13,6 @@ use super::screen::tangent;
 use super::search::{BASES, Found, NEARLY_ALL, STRONG, Search, of_other_effects};
 use super::simulated::Draws;
 
-/// Log-likelihood by which pairs may be behind the best, and either be the right one.
-const NEAR_THE_BEST: f64 = 6.0;
-
 /// Hypotheses of several effects that were descended from, and where that led.
 pub(super) struct Tried {
     rounds: &'static [Rung],
@@ -193,21 +190,22 @@ impl Search<'_> {
     /// Adds pairs with either effect of the best one exchanged for others than were tried, and then the effects that were not kept so far
     /// of those that come near it.
     fn exchange(&self, tried: &mut Tried) {
+        /// Log-likelihood by which pairs may be behind the best, and either be the right one.
+        const NEAR: f64 = 6.0;
         if !tried.may_be_better() {
             return;
         }
         let mut kept: Vec<Part> = Vec::new();
-        for near in [0.0, NEAR_THE_BEST] {
+        for near in [0.0, NEAR] {
             let keep = self.worth_keeping(&tried.descents, near, &kept);
             if keep.is_empty() {
                 break;
             }
-            let alone: Vec<Hypothesis> = keep.iter().cloned().map(Hypothesis::of).collect();
             let names: Vec<&str> = (keep.iter())
                 .map(|part| self.atlas().probes[part.probe].spec.name)
                 .collect();
             self.tell(format_args!("what else goes with {}", names.join(" or ")));
-            let exchanged = self.beside_each(&alone, &tried.starts);
+            let exchanged = self.beside_each(&keep, &tried.starts);
             self.descend_on(tried, exchanged);
             kept.extend(keep);
         }

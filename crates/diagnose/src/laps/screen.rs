@@ -58,10 +58,17 @@ impl Atlas {
 
     /// The best constant score over all probes: what the alarm looks at.
     pub(super) fn best_score(&self, residual: &White) -> f64 {
-        (0..self.probes.len())
-            .filter_map(|probe| self.screen_one(probe, &self.nodes(probe), Shape::Constant, residual))
-            .map(|s| s.score)
-            .fold(0.0, f64::max)
+        let all = self.screen_constant(0..self.probes.len(), residual);
+        all.map(|s| s.score).fold(0.0, f64::max)
+    }
+
+    /// Some probes of constant size, each at its best.
+    pub(super) fn screen_constant(
+        &self,
+        probes: impl Iterator<Item = usize>,
+        residual: &White,
+    ) -> impl Iterator<Item = Screened> {
+        probes.filter_map(|probe| self.screen_one(probe, &self.nodes(probe), Shape::Constant, residual))
     }
 
     /// Sizes and actions along a probe's path, the neutral size among them, in order of size.

@@ -219,14 +219,15 @@ impl Search<'_> {
         let Some(left) = self.left_by(others) else {
             return Vec::new();
         };
-        let mut screened = self.atlas().screen(&left);
-        let probe_of = |s: &Screened| &probes[s.hypothesis.parts[0].probe];
-        screened.retain(|s| s.hypothesis.is_constant() && probe_of(s).spec == own.spec);
+        let of_effect = (0..probes.len()).filter(|&probe| probes[probe].spec == own.spec);
+        let mut screened: Vec<Screened> = self.atlas().screen_constant(of_effect, &left).collect();
+        screened.sort_by(|a, b| b.score.total_cmp(&a.score));
         let Some(best) = screened.first() else {
             return Vec::new();
         };
+        let is_at_other = |s: &Screened| probes[s.hypothesis.parts[0].probe].is_at_other_sensor(own);
         (screened.iter())
-            .filter(|s| probe_of(s).is_at_other_sensor(own) && s.score > 0.0 && s.may_win(best, SHARE))
+            .filter(|s| is_at_other(s) && s.score > 0.0 && s.may_win(best, SHARE))
             .map(|s| s.hypothesis.clone())
             .collect()
     }
