@@ -26,22 +26,6 @@ pub(super) struct Base {
     following: Vec<White>,
 }
 
-/// Which of what was simulated by few data sets is simulated by more: so many at least, and what is so near the best.
-pub(super) struct Again {
-    pub(super) least: usize,
-    /// Log-likelihood.
-    pub(super) near: f64,
-}
-
-impl Again {
-    /// How many of such scores, best first.
-    pub(super) fn of(&self, mut scores: impl Iterator<Item = f64>) -> usize {
-        let Some(best) = scores.next() else { return 0 };
-        let near = 1 + scores.take_while(|score| *score > best - self.near).count();
-        near.max(self.least)
-    }
-}
-
 impl Base {
     /// The same in units of another scatter, if there is one.
     pub(super) fn in_units_of(self, scatter: Option<Vec<Scatter>>) -> Self {
@@ -210,77 +194,55 @@ impl Search<'_> {
     }
 
     /// The best of what was screened beside a base, at the sizes and with the scores that simulations give them: paths were
-    /// simulated without the base, and actions do not quite add up. The best are simulated again, with other draws.
+    /// simulated without the base, and actions do not quite add up.
     pub(super) fn heard_beside(&self, base: &Base, screened: Vec<Screened>) -> Vec<Screened> {
-        const AGAIN: Again = Again { least: 8, near: 40.0 };
-        /// Data sets, twice those whose noise is not the same.
-        const LOOKS: [[Draws; 2]; 2] = [
-            [Draws::Sets(0..2), Draws::Sets(4..6)],
-            [Draws::Sets(2..4), Draws::Sets(6..8)],
-        ];
-        let left = |further: &[Setting], look: usize| self.trial.left_twice(base, further, &LOOKS[look]);
-        let left_again = |further: &[Setting], before: &[White; 2]| Some(mean_of(before, &left(further, 1)?));
-        let Some((at_first, by_base)) = left(&[], 0).and_then(|first| {
-            let both = left_again(&[], &first)?;
-            Some((first, both))
-        }) else {
+        const HEARD: usize = 16;
+        const OF_ONE_EFFECT: usize = 2;
+        const SHARE: f64 = 0.4;
+        /// Data sets whose noise is not the same.
+        const DRAWS: [Draws; 2] = [Draws::Sets(0..4), Draws::Sets(4..8)];
+        let probe_of = |s: &Screened| s.hypothesis.parts[0].probe;
+        let spec_of = |probe: usize| self.atlas().probes[probe].spec;
+        let left = |further: &[Setting]| self.trial.left_twice(base, further, &DRAWS);
+        let (Some(first), Some(left_by_base)) = (screened.first(), left(&[])) else {
             return screened;
         };
-        // The multiple of an effect that explains most, and what it then scores more than paths tell.
-        let found = |effect: &Screened, with: &[White; 2], by_base: &[White; 2]| {
-            let (multiple, gain) = explains(&difference(by_base, with), by_base, false);
-            let score = self.atlas().score_of_constant(effect.probe(), gain);
-            (multiple, score - effect.score)
-        };
-        let mut heard: Vec<(&Screened, [White; 2], (f64, f64))> =
-            (self.worth_hearing(&screened).into_par_iter())
-                .filter_map(|effect| {
-                    let with = left(&effect.hypothesis.settings(self.atlas()), 0)?;
-                    let found = found(effect, &with, &at_first);
-                    Some((effect, with, found))
-                })
-                .collect();
-        let score = |heard: &(&Screened, [White; 2], (f64, f64))| heard.0.score + heard.2.1;
-        heard.sort_by(|a, b| score(b).total_cmp(&score(a)));
-        let again = AGAIN.of(heard.iter().map(score));
-        let simulated: BTreeMap<usize, (f64, f64)> = (heard.into_par_iter().enumerate())
-            .filter_map(|(place, (effect, with, at_first))| {
-                if place >= again {
-                    return Some((effect.probe(), at_first));
-                }
-                let with = left_again(&effect.hypothesis.settings(self.atlas()), &with)?;
-                Some((effect.probe(), found(effect, &with, &by_base)))
+        let mut heard: Vec<usize> = Vec::new();
+        for candidate in screened
+            .iter()
+            .filter(|candidate| candidate.may_win(first, SHARE))
+        {
+            let probe = probe_of(candidate);
+            let alike = heard.iter().filter(|&&other| spec_of(other) == spec_of(probe));
+            if heard.len() < HEARD && !heard.contains(&probe) && alike.count() < OF_ONE_EFFECT {
+                heard.push(probe);
+            }
+        }
+        let simulated: BTreeMap<usize, Option<(f64, f64)>> = (heard.into_par_iter())
+            .map(|probe| {
+                let constant = |s: &&Screened| probe_of(s) == probe && s.hypothesis.is_constant();
+                let constant = screened.iter().find(constant);
+                let best = constant.and_then(|constant| {
+                    let with = left(&constant.hypothesis.settings(self.atlas()))?;
+                    let (multiple, gain) = explains(&difference(&left_by_base, &with), &left_by_base, false);
+                    let score = self.atlas().score_of_constant(probe, gain);
+                    Some((multiple, score - constant.score))
+                });
+                (probe, best)
             })
             .collect();
         let corrected = |mut candidate: Screened| {
-            let &(multiple, change) = simulated.get(&candidate.probe())?;
+            let probe = probe_of(&candidate);
+            let (multiple, change) = (*simulated.get(&probe)?)?;
             candidate.score += change;
             if candidate.hypothesis.is_constant() {
                 candidate.hypothesis.parts[0] = candidate.hypothesis.parts[0].times(multiple, self.atlas());
             }
             Some(candidate)
         };
-        let mut all: Vec<Screened> = screened.iter().cloned().filter_map(corrected).collect();
+        let mut all: Vec<Screened> = screened.into_iter().filter_map(corrected).collect();
         all.sort_by(|a, b| b.score.total_cmp(&a.score));
         all
-    }
-
-    /// Those of effects that were screened, best first, that may explain most once they are simulated: two of each effect at most.
-    fn worth_hearing<'s>(&self, screened: &'s [Screened]) -> Vec<&'s Screened> {
-        const MOST: usize = 16;
-        const OF_ONE_EFFECT: usize = 2;
-        const SHARE: f64 = 0.4;
-        let spec_of = |effect: &Screened| self.atlas().probes[effect.probe()].spec;
-        let mut worth: Vec<&Screened> = Vec::new();
-        for candidate in (screened.iter()).take_while(|candidate| candidate.may_win(&screened[0], SHARE)) {
-            let known = worth.iter().any(|other| other.probe() == candidate.probe());
-            let alike = worth.iter().filter(|other| spec_of(other) == spec_of(candidate));
-            if worth.len() < MOST && !known && alike.count() < OF_ONE_EFFECT {
-                let is_it = |s: &&Screened| s.probe() == candidate.probe() && s.hypothesis.is_constant();
-                worth.extend(screened.iter().find(is_it));
-            }
-        }
-        worth
     }
 
     /// Effects with those that explain best what each of them leaves, but for those pairs that were tried: actions do not quite add up,
@@ -326,11 +288,6 @@ pub(super) fn twice(draws: &[Draws; 2], left: impl Fn(&Draws) -> Option<White>) 
     Some([first, second])
 }
 
-/// What several draws leave on average of two looks, each by two groups of data sets.
-fn mean_of(one: &[White; 2], other: &[White; 2]) -> [White; 2] {
-    [0, 1].map(|i| (&one[i] + &other[i]) * 0.5)
-}
-
 /// What one thing leaves less what another does, each by two groups of data sets.
 pub(super) fn difference(one: &[White; 2], other: &[White; 2]) -> [White; 2] {
     [0, 1].map(|i| &one[i] - &other[i])
@@ -358,15 +315,7 @@ fn best_multiple(product: f64, square: f64, odd: bool) -> (f64, f64) {
 
 #[cfg(test)]
 mod tests {
-    use super::{Again, best_multiple};
-
-    #[test]
-    fn what_is_near_the_best_is_simulated_again_and_a_few_always() {
-        let again = Again { least: 2, near: 10.0 };
-        assert_eq!(again.of([100.0, 95.0, 90.1, 89.9, 50.0].into_iter()), 3);
-        assert_eq!(again.of([100.0, 80.0, 70.0].into_iter()), 2);
-        assert_eq!(again.of(std::iter::empty()), 0);
-    }
+    use super::best_multiple;
 
     #[test]
     fn a_multiple_is_the_vertex_of_a_parabola_within_bounds() {

@@ -1,12 +1,8 @@
 //! Two effects at once: which go together, and pairs tried to the end.
 
-use std::ops::Range;
-
 use nalgebra::{Matrix2, Vector2};
 use rayon::prelude::*;
 
-use super::atlas::White;
-use super::beside::Again;
 use super::hunt::Hunt;
 use super::hypothesis::Hypothesis;
 use super::part::{Part, Shape};
@@ -176,13 +172,8 @@ impl Search<'_> {
     }
 
     /// Pairs after [`Search::exchange`], tried to the end.
-    pub(super) fn with_exchanged(&self, tried: Tried) -> Vec<Found> {
-        self.with_exchanged_beside(tried, None)
-    }
-
-    /// The same with only those exchanged that are beside the effect of a probe, if there is a `certain` one.
-    pub(super) fn with_exchanged_beside(&self, mut tried: Tried, certain: Option<usize>) -> Vec<Found> {
-        self.exchange(&mut tried, certain);
+    pub(super) fn with_exchanged(&self, mut tried: Tried) -> Vec<Found> {
+        self.exchange(&mut tried);
         self.settle_tried(tried)
     }
 
@@ -197,8 +188,8 @@ impl Search<'_> {
     }
 
     /// Adds pairs with either effect of the best one exchanged for others than were tried, and then the effects that were not kept so far
-    /// of those that come near it; only the effect beside a `certain` one if there is such.
-    fn exchange(&self, tried: &mut Tried, certain: Option<usize>) {
+    /// of those that come near it.
+    fn exchange(&self, tried: &mut Tried) {
         /// Log-likelihood by which pairs may be behind the best, and either be the right one.
         const NEAR: f64 = 6.0;
         if !tried.may_be_better() {
@@ -206,8 +197,7 @@ impl Search<'_> {
         }
         let mut kept: Vec<Part> = Vec::new();
         for near in [0.0, NEAR] {
-            let mut keep = self.worth_keeping(&tried.descents, near, &kept);
-            keep.retain(|part| certain.is_none_or(|certain| part.probe == certain));
+            let keep = self.worth_keeping(&tried.descents, near, &kept);
             if keep.is_empty() {
                 break;
             }
@@ -242,45 +232,28 @@ impl Search<'_> {
         keep
     }
 
-    /// The best pairs of those that were screened with the scores and sizes that simulations of both together give them, best first:
-    /// actions do not quite add up. The best by few data sets are simulated with as many more.
-    fn heard_pairs(&self, screened: Vec<ScreenedPair>) -> Vec<ScreenedPair> {
-        const LOOKS: [Range<u64>; 2] = [0..2, 2..4];
-        const AGAIN: Again = Again {
-            least: 12,
-            near: 60.0,
-        };
-        let nothing = self.atlas().at_rest(Hypothesis::nothing());
-        let left = |pair: &ScreenedPair, look: usize| {
-            let settings = pair.hypothesis.settings(self.atlas());
-            let draws = Draws::Sets(LOOKS[look].clone());
-            self.trial.left_beside(&nothing, &settings, &draws)
-        };
-        let mut looked_at: Vec<(f64, ScreenedPair, White)> = (screened.into_par_iter())
-            .filter_map(|pair| {
-                let left = left(&pair, 0)?;
-                Some((self.after_a_step(&pair, &left)?.score, pair, left))
-            })
-            .collect();
-        looked_at.sort_by(|a, b| b.0.total_cmp(&a.0));
-        looked_at.truncate(AGAIN.of(looked_at.iter().map(|pair| pair.0)));
-        let mut pairs: Vec<ScreenedPair> = (looked_at.into_par_iter())
-            .filter_map(|(_, pair, before)| {
-                let left = (before + left(&pair, 1)?) * 0.5;
-                self.after_a_step(&pair, &left)
-            })
-            .collect();
+    /// Pairs that were screened with the scores and sizes that simulations of both together give them, best first: actions do not quite
+    /// add up.
+    pub(super) fn heard_pairs(&self, screened: Vec<ScreenedPair>) -> Vec<ScreenedPair> {
+        let heard = |pair: ScreenedPair| self.heard_pair(pair);
+        let mut pairs: Vec<ScreenedPair> = screened.into_par_iter().filter_map(heard).collect();
         pairs.sort_by(|a, b| b.score.total_cmp(&a.score));
         pairs
     }
 
-    /// A pair of which simulations leave this, after one step of Gauss and Newton's method along the paths of its probes.
-    fn after_a_step(&self, pair: &ScreenedPair, left: &White) -> Option<ScreenedPair> {
+    /// A pair after one step of Gauss and Newton's method along the paths of its probes; `None` where the robot crashes.
+    fn heard_pair(&self, pair: ScreenedPair) -> Option<ScreenedPair> {
+        const SETS: u64 = 4;
         let atlas = self.atlas();
         let probes = [0, 1].map(|i| pair.hypothesis.parts[i].probe);
+        let nothing = atlas.at_rest(Hypothesis::nothing());
+        let settings = pair.hypothesis.settings(atlas);
+        let left = self
+            .trial
+            .left_beside(&nothing, &settings, &Draws::Sets(0..SETS))?;
         let [a, b] = [0, 1].map(|i| tangent(&atlas.nodes(probes[i]), pair.sizes[i]));
         let squares = Matrix2::new(a.norm_squared(), a.dot(&b), a.dot(&b), b.norm_squared());
-        let products = Vector2::new(a.dot(left), b.dot(left));
+        let products = Vector2::new(a.dot(&left), b.dot(&left));
         let step = squares.try_inverse()? * products;
         let sizes = [0, 1].map(|i| pair.sizes[i] + step[i]);
         let part = |i: usize| Part::screened(atlas, probes[i], Shape::Constant, &[sizes[i]]);

@@ -35,12 +35,6 @@ impl Rung {
         Self { behind_one, ..self }
     }
 
-    /// The share of a best score that leaves nothing significant: what is behind it is told apart by what it leaves.
-    fn share_of_fitting(&self) -> f64 {
-        const LESS: f64 = 0.2;
-        LESS * self.share
-    }
-
     /// The log-likelihood behind a best one of so many numbers.
     fn behind_a_best_of(&self, numbers: usize) -> f64 {
         if numbers > 1 { self.behind } else { self.behind_one }
@@ -132,7 +126,6 @@ impl Search<'_> {
             alive = (alive.into_par_iter())
                 .filter_map(|descent| self.trial.descend(descent, round))
                 .collect();
-            self.trial.judge_together(&mut alive);
             alive.sort_by(|a, b| b.score.total_cmp(&a.score));
             let Some(first) = alive.first() else {
                 break;
@@ -142,8 +135,7 @@ impl Search<'_> {
             let behind = rung.behind_a_best_of(first.hypothesis.fitted(self.atlas()));
             let bar = best.max(reached);
             let may_be_chance = |d: &Descent| ERRORS_BEHIND * error.hypot(d.score_error);
-            let share = if fits { rung.share_of_fitting() } else { rung.share };
-            alive.retain(|d| d.within_reach() >= bar - behind.max(share * bar).max(may_be_chance(d)));
+            alive.retain(|d| d.within_reach() >= bar - behind.max(rung.share * bar).max(may_be_chance(d)));
             alive = self.without_repeats(alive, |descent| &descent.hypothesis);
             if fits {
                 let others = alive.split_off(FEW.min(alive.len()));
@@ -213,15 +205,10 @@ impl Search<'_> {
         self.sorted(&self.closer(self.ends(&descents)))
     }
 
-    /// The ends of descents, those near the best judged together.
     fn ends(&self, descents: &[Descent]) -> Vec<Settled> {
-        let settled = (descents.par_iter()).filter_map(|descent| self.trial.settle(descent));
-        let (mut near, others) = near_and_others(settled.collect(), NEAR);
-        if near.len() > 1 {
-            near = self.trial.settle_rivals(near, 0);
-        }
-        near.extend(others);
-        near
+        (descents.par_iter())
+            .filter_map(|descent| self.trial.settle(descent))
+            .collect()
     }
 
     fn sorted(&self, settled: &[Settled]) -> Vec<Found> {
@@ -324,9 +311,9 @@ impl Search<'_> {
         const CLOSE_SETS_OF_ALL: u64 = 240;
         /// Laps of a data set of which that many are simulated; of smaller ones more, in the same time.
         const USUAL_LAPS: u64 = 80;
-        let score = |s: &&Settled| s.refined.score;
-        let best = settled.iter().max_by(|a, b| score(a).total_cmp(&score(b)));
-        if best.is_some_and(|best| is_no_answer(&self.found(best).explanation)) {
+        let best = (settled.iter().map(|s| s.refined.score)).fold(f64::NEG_INFINITY, f64::max);
+        let first = settled.iter().find(|s| s.refined.score == best);
+        if first.is_some_and(|first| is_no_answer(&self.found(first).explanation)) {
             return settled;
         }
         let smaller = (USUAL_LAPS / self.atlas().layout.total_laps() as u64).max(1);
@@ -347,22 +334,17 @@ impl Search<'_> {
     }
 }
 
-/// Hypotheses that may be as good as the best as far as these simulations tell, and the others.
+/// Hypotheses that are near the best as far as these simulations tell, and the others.
 fn close_and_others(settled: Vec<Settled>) -> (Vec<Settled>, Vec<Settled>) {
     const CLOSE: f64 = 10.0;
-    near_and_others(settled, CLOSE)
-}
-
-/// Hypotheses that are so near the best, or within the errors of these simulations, and the others.
-fn near_and_others(settled: Vec<Settled>, near: f64) -> (Vec<Settled>, Vec<Settled>) {
     let score = |s: &Settled| (s.refined.score, s.refined.fit.gain_error);
     let best = settled.iter().map(score).max_by(|a, b| a.0.total_cmp(&b.0));
     let (best, best_error) = best.unwrap_or_default();
-    let is_near = |s: &Settled| {
+    let is_close = |s: &Settled| {
         let (score, error) = score(s);
-        score > best - near.max(ERRORS * best_error.hypot(error))
+        score > best - CLOSE.max(ERRORS * best_error.hypot(error))
     };
-    settled.into_iter().partition(is_near)
+    settled.into_iter().partition(is_close)
 }
 
 /// Progress of a round, as a share of what is missing, with which a descent does not arrive.

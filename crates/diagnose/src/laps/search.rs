@@ -225,7 +225,7 @@ impl Search<'_> {
         let Some(best) = screened.first() else {
             return Vec::new();
         };
-        let is_at_other = |s: &Screened| probes[s.probe()].is_at_other_sensor(own);
+        let is_at_other = |s: &Screened| probes[s.hypothesis.parts[0].probe].is_at_other_sensor(own);
         (screened.iter())
             .filter(|s| is_at_other(s) && s.score > 0.0 && s.may_win(best, SHARE))
             .map(|s| s.hypothesis.clone())
