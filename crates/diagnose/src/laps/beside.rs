@@ -201,7 +201,6 @@ impl Search<'_> {
         const SHARE: f64 = 0.4;
         /// Data sets whose noise is not the same.
         const DRAWS: [Draws; 2] = [Draws::Sets(0..4), Draws::Sets(4..8)];
-        let probe_of = |s: &Screened| s.hypothesis.parts[0].probe;
         let spec_of = |probe: usize| self.atlas().probes[probe].spec;
         let left = |further: &[Setting]| self.trial.left_twice(base, further, &DRAWS);
         let (Some(first), Some(left_by_base)) = (screened.first(), left(&[])) else {
@@ -212,7 +211,7 @@ impl Search<'_> {
             .iter()
             .filter(|candidate| candidate.may_win(first, SHARE))
         {
-            let probe = probe_of(candidate);
+            let probe = candidate.probe();
             let alike = heard.iter().filter(|&&other| spec_of(other) == spec_of(probe));
             if heard.len() < HEARD && !heard.contains(&probe) && alike.count() < OF_ONE_EFFECT {
                 heard.push(probe);
@@ -220,7 +219,7 @@ impl Search<'_> {
         }
         let simulated: BTreeMap<usize, Option<(f64, f64)>> = (heard.into_par_iter())
             .map(|probe| {
-                let constant = |s: &&Screened| probe_of(s) == probe && s.hypothesis.is_constant();
+                let constant = |s: &&Screened| s.probe() == probe && s.hypothesis.is_constant();
                 let constant = screened.iter().find(constant);
                 let best = constant.and_then(|constant| {
                     let with = left(&constant.hypothesis.settings(self.atlas()))?;
@@ -232,7 +231,7 @@ impl Search<'_> {
             })
             .collect();
         let corrected = |mut candidate: Screened| {
-            let probe = probe_of(&candidate);
+            let probe = candidate.probe();
             let (multiple, change) = (*simulated.get(&probe)?)?;
             candidate.score += change;
             if candidate.hypothesis.is_constant() {

@@ -175,7 +175,7 @@ fn explain(search: &Search<'_>, mut found: Vec<Found>) -> Vec<Found> {
         if first_is(&clear, leaves_nothing_to_ask) {
             found = preferred(found, clear);
             if first_is(&found, |best| best.effects.len() > 1) {
-                return held_still(search, simplified(search, found));
+                return questioned(search, found);
             }
         }
         if jumps {
@@ -239,6 +239,11 @@ fn explain(search: &Search<'_>, mut found: Vec<Found>) -> Vec<Found> {
         sort(&mut unnamed);
         found = unless_named(found, unnamed);
     }
+    questioned(search, found)
+}
+
+/// Explanations after what the first may need less of, or something alike in place of, and whether it holds still.
+fn questioned(search: &Search<'_>, found: Vec<Found>) -> Vec<Found> {
     held_still(search, with_others_alike(search, simplified(search, found)))
 }
 

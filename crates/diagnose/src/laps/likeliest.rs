@@ -30,6 +30,8 @@ pub(super) struct Likeliest {
     /// The hypothesis itself, without the price of its numbers.
     pub(super) gain: f64,
     pub(super) fit: Fit,
+    /// The hypothesis simulated.
+    pub(super) center: Evaluated,
     /// What this look told, and those before.
     pub(super) rises: Rises,
 }
@@ -87,7 +89,8 @@ impl Trial<'_> {
             let there = hypothesis.moved(self.atlas, &[(*freedom, moved)]);
             self.evaluate_more(&there, evaluated.clone(), sets)
         };
-        let center = self.fit_with_error(&more(0.0, &local.center)?)?;
+        let simulated = more(0.0, &local.center)?;
+        let center = self.fit_with_error(&simulated)?;
         let gained =
             |moved: f64, evaluated: &Evaluated| Some(self.fit(&more(moved, evaluated)?)?.gain - center.gain);
         let (down, up) = ((down, gained(down, at_down)?), (up, gained(up, at_up)?));
@@ -103,6 +106,7 @@ impl Trial<'_> {
             hoped: top.height,
             gain: center.fair_gain(),
             fit: center,
+            center: simulated,
             rises: rises.from(there.apart(hypothesis, freedom, self.atlas)),
         })
     }

@@ -1,5 +1,7 @@
 //! How likely data are under a simulated hypothesis.
 
+use rayon::prelude::*;
+
 use super::atlas::{Atlas, White, white};
 use super::expectation::{Expectation, Scatter};
 use super::simulated::Evaluated;
@@ -26,6 +28,8 @@ pub(super) struct Fit {
     pub(super) lost_to_doubt: f64,
     /// Standard deviation of the gain for the simulation's own error.
     pub(super) gain_error: f64,
+    /// The part of that which is due to the error of the simulated mean laps.
+    error_of_mean: f64,
 }
 
 impl Fit {
@@ -46,13 +50,39 @@ impl Trial<'_> {
     /// next than their covariance says.
     pub(super) fn fit_with_error(&self, simulated: &Evaluated) -> Option<Fit> {
         let fit = self.fit(simulated)?;
-        let gain_error = fit.gain_error.max(self.jackknife_error(simulated));
+        let gain_error = fit
+            .gain_error
+            .max(self.jackknife_error(simulated, |part| self.fit(part)));
         Some(Fit { gain_error, ..fit })
+    }
+
+    /// How well simulated hypotheses that explain data about as well do so: they are told apart by what they do to the mean, and by
+    /// their scatter only as far as theirs differ by more than chance. The errors of their gains are those that they do not share: of
+    /// their means, and by a jackknife as much larger as those of all of them are.
+    pub(super) fn fits_of_rivals(&self, rivals: &[&Evaluated]) -> Option<Vec<Fit>> {
+        let scatters = self.atlas.scatters_of(rivals)?;
+        if let ([only], [scatter]) = (rivals, scatters.as_slice()) {
+            return Some(vec![self.fit_in(only, scatter)]);
+        }
+        let fit = |(rival, scatter): (&&Evaluated, &Vec<Scatter>)| {
+            let fit = self.fit_in(rival, scatter);
+            let by_jackknife = self.jackknife_error(rival, |part| Some(self.fit_in(part, scatter)));
+            (fit, by_jackknife)
+        };
+        let found: Vec<(Fit, f64)> = rivals.par_iter().zip(&scatters).map(fit).collect();
+        let sum = |square: fn(&(Fit, f64)) -> f64| found.iter().map(square).sum::<f64>();
+        let larger = sum(|found| found.1.powi(2)) / sum(|found| found.0.error_of_mean.powi(2));
+        let larger = larger.sqrt().max(1.0);
+        let with_own_error = |(fit, _): (Fit, f64)| Fit {
+            gain_error: fit.error_of_mean * larger,
+            ..fit
+        };
+        Some(found.into_iter().map(with_own_error).collect())
     }
 
     /// The standard deviation of the gain by a jackknife that leaves out a part of the data sets after the other; none if they
     /// are too few.
-    fn jackknife_error(&self, simulated: &Evaluated) -> f64 {
+    fn jackknife_error(&self, simulated: &Evaluated, fit: impl Fn(&Evaluated) -> Option<Fit>) -> f64 {
         const PARTS: usize = 4;
         let gain_without = |part: usize| {
             let kept = |&(set, _): &(usize, &Summary)| set % PARTS != part;
@@ -60,7 +90,7 @@ impl Trial<'_> {
             let (sets, summaries): (Vec<usize>, Vec<Summary>) =
                 kept.map(|(set, summary)| (set, summary.clone())).unzip();
             let declared: Vec<&Expectation> = sets.iter().map(|&set| &self.atlas.samples[set]).collect();
-            let fit = self.fit(&self.atlas.evaluated(summaries, &declared, simulated.doubt.alike))?;
+            let fit = fit(&self.atlas.evaluated(summaries, &declared, simulated.doubt.alike))?;
             Some(fit.fair_gain())
         };
         let gains: Vec<f64> = (0..PARTS).filter_map(gain_without).collect();
@@ -84,7 +114,8 @@ impl Trial<'_> {
     pub(super) fn fit_of(&self, mut residual: White, scatter: &[Scatter], doubt: Doubt) -> Fit {
         let before = self.atlas.white(self.data, &self.atlas.null).norm_squared();
         let (widened, doubtful) = self.atlas.allow_for(&mut residual, doubt);
-        let (mut wider, mut variance) = (widened, doubtful * doubt.error);
+        let of_mean = doubtful * doubt.error;
+        let (mut wider, mut variance) = (widened, of_mean);
         for (g, (own, declared)) in scatter.iter().zip(&self.atlas.scatter).enumerate() {
             // Every run's mean lap and the trend are each a draw of one lap's covariance.
             let draws = (self.atlas.layout.laps[g].len() + 1) as f64;
@@ -98,6 +129,7 @@ impl Trial<'_> {
             gain: 0.5 * (before - residual.norm_squared() - wider),
             lost_to_doubt: 0.5 * widened,
             gain_error: variance.sqrt(),
+            error_of_mean: of_mean.sqrt(),
             residual,
         }
     }
@@ -145,19 +177,19 @@ impl Atlas {
 
     /// The scatter of each of several simulated hypotheses that explain data about as well: the same for all but for what
     /// chance does not explain. `None` if they were simulated too seldom.
-    pub(super) fn scatters_of(&self, rivals: &[Evaluated]) -> Option<Vec<Vec<Scatter>>> {
-        if rivals.is_empty() {
+    fn scatters_of(&self, rivals: &[&Evaluated]) -> Option<Vec<Vec<Scatter>>> {
+        let Some(sets) = rivals.iter().map(|rival| rival.summaries.len()).min() else {
             return Some(Vec::new());
-        }
-        let all = rivals.iter().flat_map(|rival| &rival.summaries);
+        };
+        let all = rivals.iter().flat_map(|rival| &rival.summaries[..sets]);
         let common = self.scatter_of(all, rivals.len())?;
-        let of = |rival: &Evaluated| {
+        let of = |rival: &&Evaluated| {
             let own = |(g, common): (usize, &Scatter)| {
                 common.unless_apart(rival.summaries.iter().map(move |summary| &summary.0[g]))
             };
             common.iter().enumerate().map(own).collect()
         };
-        rivals.iter().map(of).collect()
+        rivals.par_iter().map(of).collect()
     }
 
     /// The scatter of simulated data sets, recording by recording; of each there are so many copies, simulated with the same
@@ -190,7 +222,43 @@ fn shared_error(laps: &[usize]) -> (f64, Vec<f64>) {
 
 #[cfg(test)]
 mod tests {
+    use sim::{Setting, find};
+
     use super::*;
+    use crate::laps::atlas::Extent;
+    use crate::laps::probe::probes;
+    use crate::laps::testing::simulated;
+
+    #[test]
+    fn rivals_are_told_apart_by_their_means_and_not_by_how_their_scatters_are_off() {
+        let known = probes(0.032).into_iter();
+        let known = known.filter(|probe| probe.spec.name == "wheel-scale");
+        let atlas = Atlas::with_probes(&simulated, &[], true, known.collect(), &|| ()).unwrap();
+        let aside = |mm: f64| [Setting::constant(find("wheel-scale").unwrap(), [mm])];
+        let runs = simulated(&aside(100.0), 1000, Extent::Whole).unwrap();
+        let data = atlas.observed(&runs).unwrap();
+        let trial = Trial {
+            atlas: &atlas,
+            simulate: &simulated,
+            data: &data,
+            silent: &[],
+            spent: &atlas.spent,
+        };
+        // These two are simulated with different draws.
+        let [one, other] =
+            [99.9, 100.1].map(|mm| atlas.simulated(&simulated, &aside(mm), 32, &atlas.spent).unwrap());
+        // Of laps that scatter by 1 mm about 100 mm, by the difference of their squared distances.
+        let laps = runs.iter().flat_map(|run| &run.laps);
+        let off_mm = laps.flat_map(|lap| lap.smooth.offsets_m.iter().map(|m| 1000.0 * m - 100.0));
+        let exact = -0.2 * off_mm.sum::<f64>();
+        let apart = |fits: &[Fit]| fits[0].fair_gain() - fits[1].fair_gain();
+        let error = |fits: &[Fit]| fits[0].gain_error.hypot(fits[1].gain_error);
+        let together = trial.fits_of_rivals(&[&one, &other]).unwrap();
+        let alone = [&one, &other].map(|rival| trial.fit_with_error(rival).unwrap());
+        let off = (apart(&together) - exact).abs();
+        assert!(off < error(&together), "{off} +- {}", error(&together));
+        assert!(error(&together) < 0.7 * error(&alone), "{}", error(&alone));
+    }
 
     #[test]
     fn runs_of_equal_length_share_the_whole_error() {

@@ -3,7 +3,8 @@
 use nalgebra::{Matrix2, Vector2};
 use rayon::prelude::*;
 
-use super::hunt::Hunt;
+use super::atlas::Atlas;
+use super::hunt::{Hunt, Moved};
 use super::hypothesis::Hypothesis;
 use super::part::{Part, Shape};
 use super::pieces::ScreenedPair;
@@ -20,6 +21,8 @@ pub(super) struct Tried {
     reached: f64,
     starts: Vec<Hypothesis>,
     descents: Vec<Descent>,
+    /// How far effects may have moved since the sizes that jump beside them were found.
+    moved: Moved,
 }
 
 impl Tried {
@@ -29,6 +32,7 @@ impl Tried {
             reached,
             starts: Vec::new(),
             descents: Vec::new(),
+            moved: Moved::Far,
         }
     }
 
@@ -40,6 +44,12 @@ impl Tried {
     /// Whether the best may be better than what was reached without them.
     fn may_be_better(&self) -> bool {
         best_of(&self.descents).is_some_and(|best| best.score + ERRORS * best.score_error > self.reached)
+    }
+
+    /// Whether a descent led to where a hypothesis has its effects, whatever their sizes.
+    fn has_been_at(&self, hypothesis: &Hypothesis, atlas: &Atlas) -> bool {
+        let is_there = |descent: &Descent| hypothesis.is_at_places_of(&descent.hypothesis, atlas);
+        self.descents.iter().any(is_there)
     }
 
     /// Whether the best leaves nothing significant.
@@ -167,13 +177,22 @@ impl Search<'_> {
     /// Descends from further hypotheses.
     pub(super) fn descend_on(&self, tried: &mut Tried, further: Vec<Hypothesis>) {
         let best = best_of(&tried.descents).map_or(tried.reached, |best| best.score);
-        (tried.descents).extend(self.descend_several(&further, tried.rounds, best));
+        let descents = self.descend_several(&further, tried.rounds, best);
+        if best_of(&descents).is_some_and(|further| further.score > best) {
+            tried.moved = Moved::Far;
+        }
+        tried.descents.extend(descents);
         tried.starts.extend(further);
     }
 
     /// Pairs after [`Search::exchange`], tried to the end.
-    pub(super) fn with_exchanged(&self, mut tried: Tried) -> Vec<Found> {
-        self.exchange(&mut tried);
+    pub(super) fn with_exchanged(&self, tried: Tried) -> Vec<Found> {
+        self.with_exchanged_beside(tried, None)
+    }
+
+    /// The same with only those exchanged that are beside the effect of a probe, if there is a `certain` one.
+    pub(super) fn with_exchanged_beside(&self, mut tried: Tried, certain: Option<usize>) -> Vec<Found> {
+        self.exchange(&mut tried, certain);
         self.settle_tried(tried)
     }
 
@@ -181,15 +200,22 @@ impl Search<'_> {
     /// none.
     pub(super) fn settle_tried(&self, tried: Tried) -> Vec<Found> {
         if tried.may_be_better() {
-            self.settle(tried.descents)
+            self.settle_moved(tried.descents, tried.moved)
         } else {
             Vec::new()
         }
     }
 
+    /// Where descents led, with sizes that jump brought to rest, without telling rivals apart any closer.
+    pub(super) fn settle_roughly_tried(&self, tried: &mut Tried) -> Vec<Found> {
+        tried.descents = self.hunted_again(std::mem::take(&mut tried.descents), tried.moved);
+        tried.moved = Moved::Little;
+        self.settle_roughly(&tried.descents)
+    }
+
     /// Adds pairs with either effect of the best one exchanged for others than were tried, and then the effects that were not kept so far
-    /// of those that come near it.
-    fn exchange(&self, tried: &mut Tried) {
+    /// of those that come near it; only the effect beside a `certain` one if there is such.
+    fn exchange(&self, tried: &mut Tried, certain: Option<usize>) {
         /// Log-likelihood by which pairs may be behind the best, and either be the right one.
         const NEAR: f64 = 6.0;
         if !tried.may_be_better() {
@@ -197,7 +223,8 @@ impl Search<'_> {
         }
         let mut kept: Vec<Part> = Vec::new();
         for near in [0.0, NEAR] {
-            let keep = self.worth_keeping(&tried.descents, near, &kept);
+            let mut keep = self.worth_keeping(&tried.descents, near, &kept);
+            keep.retain(|part| certain.is_none_or(|certain| part.probe == certain));
             if keep.is_empty() {
                 break;
             }
@@ -205,7 +232,9 @@ impl Search<'_> {
                 .map(|part| self.atlas().probes[part.probe].spec.name)
                 .collect();
             self.tell(format_args!("what else goes with {}", names.join(" or ")));
-            let exchanged = self.beside_each(&keep, &tried.starts);
+            let mut exchanged = self.beside_each(&keep, &tried.starts);
+            // A place is screened at a grid: from a neighbour of where one was found the same would be found again.
+            exchanged.retain(|pair| !tried.has_been_at(pair, self.atlas()));
             self.descend_on(tried, exchanged);
             kept.extend(keep);
         }
@@ -234,7 +263,7 @@ impl Search<'_> {
 
     /// Pairs that were screened with the scores and sizes that simulations of both together give them, best first: actions do not quite
     /// add up.
-    pub(super) fn heard_pairs(&self, screened: Vec<ScreenedPair>) -> Vec<ScreenedPair> {
+    fn heard_pairs(&self, screened: Vec<ScreenedPair>) -> Vec<ScreenedPair> {
         let heard = |pair: ScreenedPair| self.heard_pair(pair);
         let mut pairs: Vec<ScreenedPair> = screened.into_par_iter().filter_map(heard).collect();
         pairs.sort_by(|a, b| b.score.total_cmp(&a.score));

@@ -416,10 +416,15 @@ impl Part {
 }
 
 impl Atlas {
-    /// Whether two parts do about the same, as far as their paths tell: at their mean sizes, whatever these are.
+    /// Whether two parts do about the same, as far as their paths tell: at their mean sizes, whatever these are. More slip and slip that
+    /// remembers do, and of both paths tell little but noise.
     pub(super) fn do_alike(&self, one: &Part, other: &Part) -> bool {
         /// Cosine of the angle between their actions.
         const ALIKE: f64 = 0.95;
+        let slips = |part: &Part| part.slipping_otherwise(self).is_some();
+        if slips(one) && slips(other) {
+            return true;
+        }
         let action = |part: &Part| {
             let nodes = self.nodes(part.probe);
             (!nodes.is_empty()).then(|| at(&nodes, part.mean_size(self)))

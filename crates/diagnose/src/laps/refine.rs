@@ -10,7 +10,7 @@ use super::likeliest::{Likeliest, Rises};
 use super::likelihood::Fit;
 use super::parabola::{Column, Local, Nearest};
 use super::part::{Freedom, Part, Shape};
-use super::rounds::ERRORS;
+use super::rounds::{ERRORS, best_of};
 use super::screen::price;
 use super::simulated::Evaluated;
 use super::tests_of_fit::{Departures, HOPELESS_P, SIGNIFICANT_P};
@@ -110,23 +110,46 @@ pub(super) struct Descent {
     rests: bool,
     /// Whether there is nowhere left to descend to.
     found: bool,
-    /// The hypothesis simulated as often as at the end, if it was.
-    end: Option<Evaluated>,
+    /// What the score was judged by, unless by what steps to all sides told.
+    judged: Option<Judged>,
+}
+
+/// What a descent's score was judged by.
+#[derive(Debug, Clone)]
+struct Judged {
+    simulated: Evaluated,
+    /// Log-likelihood that its numbers were hoped to gain once they moved.
+    hoped: f64,
+    /// Whether they did not move after all.
+    stays: bool,
+}
+
+impl Judged {
+    /// By the hypothesis as it stays.
+    fn staying(simulated: Evaluated) -> Self {
+        Self {
+            simulated,
+            hoped: 0.0,
+            stays: true,
+        }
+    }
 }
 
 /// A hypothesis that was looked around in a full round.
 #[derive(Debug, Clone)]
 struct Seen {
     hypothesis: Hypothesis,
+    simulated: Evaluated,
     /// Log-likelihood gained by it as it is, and the standard deviation of that for the simulation's own error.
     gain: f64,
     error: f64,
 }
 
 impl Seen {
-    fn new(hypothesis: &Hypothesis, fit: &Fit) -> Self {
+    fn new(hypothesis: &Hypothesis, simulated: Evaluated, fit: &Fit) -> Self {
         Self {
             hypothesis: hypothesis.clone(),
+            simulated,
             gain: fit.fair_gain(),
             error: fit.gain_error,
         }
@@ -134,10 +157,15 @@ impl Seen {
 
     /// Whether this is no better than what led to it, nor so much worse that it went too far: what parabolas promise is noise then.
     fn is_no_better_than(&self, before: &Self) -> bool {
-        const BETTER: f64 = 1.0;
-        let gained = self.gain - before.gain;
-        gained < BETTER && -gained < ERRORS * self.error.hypot(before.error)
+        is_no_better((self.gain, self.error), (before.gain, before.error))
     }
+}
+
+/// Whether a gain in log-likelihood is no larger than one before, nor smaller beyond the errors of both.
+fn is_no_better((gain, error): (f64, f64), (before, error_before): (f64, f64)) -> bool {
+    const BETTER: f64 = 1.0;
+    let gained = gain - before;
+    gained < BETTER && -gained < ERRORS * error.hypot(error_before)
 }
 
 impl Descent {
@@ -158,7 +186,7 @@ impl Descent {
             holds: false,
             rests: freedoms.is_empty(),
             found: false,
-            end: None,
+            judged: None,
             freedoms,
         }
     }
@@ -170,15 +198,15 @@ impl Descent {
             rises: Rises::default(),
             seen: None,
             found: false,
-            end: None,
+            judged: None,
             ..self
         }
     }
 
-    /// The score that another round like the last one would reach.
+    /// The score that another round like the last one would reach, as far as that one's progress was no chance.
     pub(super) fn within_reach(&self) -> f64 {
         let progress = Some(self.progress).filter(|progress| progress.is_finite());
-        self.score + progress.unwrap_or(0.0).max(0.0)
+        self.score + (progress.unwrap_or(0.0) - ERRORS * self.score_error).max(0.0)
     }
 
     /// Whether nothing short of another effect would help, as far as a round saw.
@@ -214,7 +242,10 @@ impl Trial<'_> {
     /// means for parabolas in each number, and goes to where these are nearest to the data.
     pub(super) fn descend(&self, descent: Descent, round: Round) -> Option<Descent> {
         if descent.found {
-            return Some(descent);
+            return Some(Descent {
+                progress: 0.0,
+                ..descent
+            });
         }
         if descent.rests {
             return self.weigh(descent, round);
@@ -246,7 +277,7 @@ impl Trial<'_> {
             progress: score - descent.score,
             remainder: Some(Departures::new(&fit.residual, &self.atlas.layout)),
             found,
-            end: found.then_some(center),
+            judged: Some(Judged::staying(center)),
             ..descent
         })
     }
@@ -264,19 +295,23 @@ impl Trial<'_> {
             return Some(self.atlas.climbed(descent, likeliest, round));
         }
         local.sides.clear();
-        let nearest = self.nearest(&local.center, &local.scatter, &local.columns, freedoms);
-        let mut here = None;
+        let center = if round == Round::Rough {
+            local.center.clone()
+        } else {
+            let sets = self.atlas.enough(round.sets(), 1);
+            self.evaluate_more(hypothesis, local.center.clone(), sets)?
+        };
+        let nearest = self.nearest(&center, &local.scatter, &local.columns, freedoms);
+        let (mut here, mut judged) = (None, None);
         let (gain, score_error) = if round == Round::Rough {
             let fit = &nearest.fit;
             let too_little = (self.atlas.least_left(hypothesis) - fit.residual.norm_squared()).max(0.0);
             (fit.fair_gain() - 0.5 * too_little, fit.gain_error)
         } else {
-            let sets = self.atlas.enough(round.sets(), 1);
-            let center = self.evaluate_more(hypothesis, local.center.clone(), sets)?;
             let fit = self.fit_with_error(&center)?;
             // Several effects go farther than one on parabolas that are a little off.
             if full && hypothesis.parts.len() == 1 {
-                let seen = Seen::new(hypothesis, &fit);
+                let seen = Seen::new(hypothesis, center.clone(), &fit);
                 if descent
                     .seen
                     .as_ref()
@@ -286,6 +321,11 @@ impl Trial<'_> {
                 }
                 here = Some(seen);
             }
+            judged = Some(Judged {
+                simulated: center,
+                hoped: nearest.hoped,
+                stays: false,
+            });
             (self.hoped_gain(hypothesis, &fit, nearest.hoped), fit.gain_error)
         };
         let Descent {
@@ -317,7 +357,7 @@ impl Trial<'_> {
             holds,
             rests: false,
             found,
-            end: None,
+            judged,
             remainder,
             hypothesis,
             freedoms,
@@ -342,16 +382,18 @@ impl Trial<'_> {
         let nearest = self.nearest(&center, &local.scatter, &columns, &freedoms);
         let fit = self.fit_with_error(&center)?;
         let gain = self.hoped_gain(&descent.hypothesis, &fit, nearest.hoped);
-        let Nearest { moves, errors, .. } = nearest;
+        let Nearest {
+            moves, errors, hoped, ..
+        } = nearest;
         let found = full && is_settled(&moves, &nearest.covariance, &freedoms);
         let remainder = Some(Departures::new(&nearest.fit.residual, &self.atlas.layout));
         let at_rest =
             found && (moves.iter().zip(&errors)).all(|(moved, error)| moved.abs() < AT_REST * error);
-        let (hypothesis, moved, end) = if at_rest {
-            (descent.hypothesis, moved, Some(center))
+        let (hypothesis, moved) = if at_rest {
+            (descent.hypothesis, moved)
         } else {
             let hypothesis = self.atlas.with_moves(&descent.hypothesis, &freedoms, &moves);
-            (hypothesis, moved + moves, None)
+            (hypothesis, moved + moves)
         };
         let score = self.atlas.score_of(&hypothesis, gain);
         Some(Descent {
@@ -366,7 +408,11 @@ impl Trial<'_> {
             looks,
             rests: false,
             found,
-            end,
+            judged: Some(Judged {
+                simulated: center,
+                hoped,
+                stays: at_rest,
+            }),
             hypothesis,
             freedoms,
             errors,
@@ -391,9 +437,12 @@ impl Trial<'_> {
         {
             return None;
         }
-        let end = match &found.end {
-            Some(end) if hypothesis == found.hypothesis => end.clone(),
-            _ => self.evaluate(&hypothesis, self.atlas.enough(END_SETS, 1))?,
+        let sets = self.atlas.enough(END_SETS, 1);
+        let end = match &found.judged {
+            Some(judged) if judged.stays && hypothesis == found.hypothesis => {
+                self.evaluate_more(&hypothesis, judged.simulated.clone(), sets)?
+            }
+            _ => self.evaluate(&hypothesis, sets)?,
         };
         let fit = self.fit_with_error(&end)?;
         Some(self.atlas.settled(hypothesis, found.errors(), fit, end))
@@ -408,14 +457,40 @@ impl Trial<'_> {
                 Some((refined, more))
             })
             .unzip();
-        let scatters = self.atlas.scatters_of(&evaluated).unwrap_or_default();
-        (refined.into_iter().zip(evaluated).zip(scatters))
-            .map(|((refined, evaluated), scatter)| {
-                let fit = self.fit_in(&evaluated, &scatter);
+        let fits = self.fits_of_rivals(&evaluated.iter().collect::<Vec<_>>());
+        (refined.into_iter().zip(evaluated).zip(fits.unwrap_or_default()))
+            .map(|((refined, evaluated), fit)| {
                 self.atlas
                     .settled(refined.hypothesis, refined.errors, fit, evaluated)
             })
             .collect()
+    }
+
+    /// Judges those descents of a round together that are near the best of them: a scatter of its own has an error of its own.
+    pub(super) fn judge_together(&self, descents: &mut [Descent]) {
+        /// Log-likelihood, and errors of it, by which a descent may be behind.
+        const NEAR: f64 = 50.0;
+        const ERRORS_BEHIND: f64 = 2.5;
+        let Some(best) = best_of(descents) else { return };
+        let (best, error) = (best.score, best.score_error);
+        let is_near = |descent: &Descent| {
+            let may_be_chance = ERRORS_BEHIND * error.hypot(descent.score_error);
+            descent.judged.is_some() && descent.score > best - NEAR.max(may_be_chance)
+        };
+        let mut rivals: Vec<&mut Descent> = descents.iter_mut().filter(|descent| is_near(descent)).collect();
+        let judged: Vec<Judged> = rivals.iter().filter_map(|rival| rival.judged.clone()).collect();
+        let simulated: Vec<&Evaluated> = judged.iter().map(|judged| &judged.simulated).collect();
+        if simulated.len() < 2 {
+            return;
+        }
+        let fits = self.fits_of_rivals(&simulated).unwrap_or_default();
+        for ((rival, fit), judged) in rivals.iter_mut().zip(fits).zip(&judged) {
+            let gain = self.hoped_gain(&rival.hypothesis, &fit, judged.hoped);
+            let score = self.atlas.score_of(&rival.hypothesis, gain);
+            rival.progress += score - rival.score;
+            rival.score = score;
+            rival.score_error = fit.gain_error;
+        }
     }
 }
 
@@ -437,6 +512,7 @@ impl Atlas {
             found: true,
             near: None,
             seen: None,
+            judged: Some(Judged::staying(better.simulated)),
             ..descent
         }
     }
@@ -453,7 +529,7 @@ impl Atlas {
             score,
             score_error: to.fit.gain_error,
             progress: score - descent.score,
-            remainder: full.then(|| Departures::new(&to.fit.residual, &self.layout)),
+            remainder: (round != Round::Rough).then(|| Departures::new(&to.fit.residual, &self.layout)),
             near: None,
             rises: to.rises,
             seen: None,
@@ -462,7 +538,11 @@ impl Atlas {
             // With so few data sets a top may be anywhere.
             rests: to.is_near && round != Round::Rough,
             found: full && to.is_near,
-            end: None,
+            judged: Some(Judged {
+                simulated: to.center,
+                hoped: to.hoped,
+                stays: false,
+            }),
             errors: vec![to.error],
             hypothesis,
             freedoms,
@@ -580,14 +660,9 @@ mod tests {
 
     #[test]
     fn what_gains_nothing_within_noise_is_no_better() {
-        let seen = |gain: f64| Seen {
-            hypothesis: Hypothesis::nothing(),
-            gain,
-            error: 3.0,
-        };
         // Twice the error of the difference is 8.5.
         for (gain, no_better) in [(102.0, false), (100.5, true), (92.0, true), (91.0, false)] {
-            assert_eq!(seen(gain).is_no_better_than(&seen(100.0)), no_better, "{gain}");
+            assert_eq!(is_no_better((gain, 3.0), (100.0, 3.0)), no_better, "{gain}");
         }
     }
 }

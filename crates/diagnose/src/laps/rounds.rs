@@ -35,9 +35,20 @@ impl Rung {
         Self { behind_one, ..self }
     }
 
-    /// The log-likelihood behind a best one of so many numbers.
-    fn behind_a_best_of(&self, numbers: usize) -> f64 {
-        if numbers > 1 { self.behind } else { self.behind_one }
+    /// The share of a best score that leaves nothing significant: what is behind it is told apart by what it leaves.
+    fn share_of_fitting(&self) -> f64 {
+        const LESS: f64 = 0.2;
+        LESS * self.share
+    }
+
+    /// The log-likelihood behind a best one of so many numbers, which `fits` where it leaves nothing significant.
+    fn behind_a_best_of(&self, numbers: usize, fits: bool) -> f64 {
+        const FITTING: f64 = 15.0;
+        match numbers {
+            0 | 1 => self.behind_one,
+            _ if fits => self.behind.min(FITTING),
+            _ => self.behind,
+        }
     }
 }
 
@@ -126,16 +137,18 @@ impl Search<'_> {
             alive = (alive.into_par_iter())
                 .filter_map(|descent| self.trial.descend(descent, round))
                 .collect();
+            self.trial.judge_together(&mut alive);
             alive.sort_by(|a, b| b.score.total_cmp(&a.score));
             let Some(first) = alive.first() else {
                 break;
             };
             let (best, error) = (first.score, first.score_error);
             let (hopeless, fits) = (is_hopeless(first), first.fits());
-            let behind = rung.behind_a_best_of(first.hypothesis.fitted(self.atlas()));
+            let behind = rung.behind_a_best_of(first.hypothesis.fitted(self.atlas()), fits);
             let bar = best.max(reached);
             let may_be_chance = |d: &Descent| ERRORS_BEHIND * error.hypot(d.score_error);
-            alive.retain(|d| d.within_reach() >= bar - behind.max(rung.share * bar).max(may_be_chance(d)));
+            let share = if fits { rung.share_of_fitting() } else { rung.share };
+            alive.retain(|d| d.within_reach() >= bar - behind.max(share * bar).max(may_be_chance(d)));
             alive = self.without_repeats(alive, |descent| &descent.hypothesis);
             if fits {
                 let others = alive.split_off(FEW.min(alive.len()));
@@ -188,27 +201,28 @@ impl Search<'_> {
 
     /// The ends of descents simulated often enough to judge them, best first.
     pub(super) fn settle(&self, descents: Vec<Descent>) -> Vec<Found> {
-        self.settle_hunted(self.hunted_again(descents, Moved::Far))
+        self.settle_moved(descents, Moved::Far)
     }
 
-    /// The same of descents from where sizes that jump had come to rest beside others that have moved little since.
-    pub(super) fn settle_near(&self, descents: Vec<Descent>) -> Vec<Found> {
-        self.settle_hunted(self.hunted_again(descents, Moved::Little))
+    /// The same of descents from where sizes that jump had come to rest beside others that have moved so far since.
+    pub(super) fn settle_moved(&self, descents: Vec<Descent>, moved: Moved) -> Vec<Found> {
+        self.sorted(&self.closer(self.ends(&self.hunted_again(descents, moved))))
     }
 
-    /// The same of what may be listed but hardly claimed: rivals are not told apart any closer.
-    pub(super) fn settle_roughly(&self, descents: Vec<Descent>) -> Vec<Found> {
-        self.sorted(&self.ends(&self.hunted_again(descents, Moved::Far)))
+    /// The same of what may be listed but hardly claimed, once sizes that jump came to rest: rivals are not told apart any closer.
+    pub(super) fn settle_roughly(&self, hunted: &[Descent]) -> Vec<Found> {
+        self.sorted(&self.ends(hunted))
     }
 
-    fn settle_hunted(&self, descents: Vec<Descent>) -> Vec<Found> {
-        self.sorted(&self.closer(self.ends(&descents)))
-    }
-
+    /// The ends of descents, those near the best judged together.
     fn ends(&self, descents: &[Descent]) -> Vec<Settled> {
-        (descents.par_iter())
-            .filter_map(|descent| self.trial.settle(descent))
-            .collect()
+        let settled = (descents.par_iter()).filter_map(|descent| self.trial.settle(descent));
+        let (mut near, others) = near_and_others(settled.collect(), NEAR);
+        if near.len() > 1 {
+            near = self.trial.settle_rivals(near, 0);
+        }
+        near.extend(others);
+        near
     }
 
     fn sorted(&self, settled: &[Settled]) -> Vec<Found> {
@@ -219,7 +233,7 @@ impl Search<'_> {
 
     /// Descents with better sizes of the effects that jump, which were found beside others that have moved since: those of the best
     /// descent, for those that are near it, until they come to rest or no longer matter; and those of rivals, for themselves.
-    fn hunted_again(&self, mut descents: Vec<Descent>, at_first: Moved) -> Vec<Descent> {
+    pub(super) fn hunted_again(&self, mut descents: Vec<Descent>, at_first: Moved) -> Vec<Descent> {
         /// Share of the best score by which a descent may lie behind it and still follow at the first look, log-likelihood by which it
         /// may later, and how many do.
         const SHARE: f64 = 0.03;
@@ -311,9 +325,9 @@ impl Search<'_> {
         const CLOSE_SETS_OF_ALL: u64 = 240;
         /// Laps of a data set of which that many are simulated; of smaller ones more, in the same time.
         const USUAL_LAPS: u64 = 80;
-        let best = (settled.iter().map(|s| s.refined.score)).fold(f64::NEG_INFINITY, f64::max);
-        let first = settled.iter().find(|s| s.refined.score == best);
-        if first.is_some_and(|first| is_no_answer(&self.found(first).explanation)) {
+        let score = |s: &&Settled| s.refined.score;
+        let best = settled.iter().max_by(|a, b| score(a).total_cmp(&score(b)));
+        if best.is_some_and(|best| is_no_answer(&self.found(best).explanation)) {
             return settled;
         }
         let smaller = (USUAL_LAPS / self.atlas().layout.total_laps() as u64).max(1);
@@ -334,17 +348,22 @@ impl Search<'_> {
     }
 }
 
-/// Hypotheses that are near the best as far as these simulations tell, and the others.
+/// Hypotheses that may be as good as the best as far as these simulations tell, and the others.
 fn close_and_others(settled: Vec<Settled>) -> (Vec<Settled>, Vec<Settled>) {
     const CLOSE: f64 = 10.0;
+    near_and_others(settled, CLOSE)
+}
+
+/// Hypotheses that are so near the best, or within the errors of these simulations, and the others.
+fn near_and_others(settled: Vec<Settled>, near: f64) -> (Vec<Settled>, Vec<Settled>) {
     let score = |s: &Settled| (s.refined.score, s.refined.fit.gain_error);
     let best = settled.iter().map(score).max_by(|a, b| a.0.total_cmp(&b.0));
     let (best, best_error) = best.unwrap_or_default();
-    let is_close = |s: &Settled| {
+    let is_near = |s: &Settled| {
         let (score, error) = score(s);
-        score > best - CLOSE.max(ERRORS * best_error.hypot(error))
+        score > best - near.max(ERRORS * best_error.hypot(error))
     };
-    settled.into_iter().partition(is_close)
+    settled.into_iter().partition(is_near)
 }
 
 /// Progress of a round, as a share of what is missing, with which a descent does not arrive.

@@ -389,7 +389,7 @@ impl Search<'_> {
         let base = self.trial.base(single.hypothesis.clone());
         let screened = self.screened_beside(&base, &single.left);
         let constant = screened.iter().filter(|other| other.hypothesis.is_constant());
-        let probes = constant.map(|other| other.hypothesis.parts[0].probe);
+        let probes = constant.map(|other| other.probe());
         let likely: Vec<usize> = probes.take(LIKELY).collect();
         let mut sizes = self.atlas().smallest_sizes();
         sizes.retain(|(probe, _)| likely.contains(probe));

@@ -19,6 +19,11 @@ pub(super) struct Screened {
 }
 
 impl Screened {
+    /// Its only probe.
+    pub(super) fn probe(&self) -> usize {
+        self.hypothesis.parts[0].probe
+    }
+
     /// Whether no more than the noise and the faults of paths may have put it behind the best: it has such a share of that one's
     /// score, but for what noise makes at any signal.
     pub(super) fn may_win(&self, best: &Self, share: f64) -> bool {

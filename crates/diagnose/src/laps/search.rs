@@ -9,6 +9,7 @@ use std::sync::OnceLock;
 use sim::Vec2;
 
 use super::atlas::{Atlas, White};
+use super::hunt::Moved;
 use super::hypothesis::Hypothesis;
 use super::intervals::Interval;
 use super::observed::ObservedRun;
@@ -175,7 +176,10 @@ impl Search<'_> {
         };
         let starts = (0..hypothesis.parts.len()).flat_map(exchanged).filter(is_new);
         let starts: Vec<Hypothesis> = starts.collect();
-        self.settle_near(self.descend(starts.iter(), &ROUNDS, f64::NEG_INFINITY))
+        self.settle_moved(
+            self.descend(starts.iter(), &ROUNDS, f64::NEG_INFINITY),
+            Moved::Little,
+        )
     }
 
     /// Explanations near the best with the same effects at the other sensors, tried to the end: of one effect two were so far.
@@ -204,7 +208,7 @@ impl Search<'_> {
         let rounds: &[Rung] = if several { &ROUNDS_BESIDE } else { &ROUNDS };
         let mut descents = self.descend(starts.iter(), rounds, best);
         descents.retain(|descent| descent.score > best - BEHIND.max(ERRORS * descent.score_error));
-        self.settle_near(descents)
+        self.settle_moved(descents, Moved::Little)
     }
 
     /// The effect of a part at the other sensors where it may win by what it explains, beside some effects, of what these leave; none of
@@ -225,7 +229,7 @@ impl Search<'_> {
         let Some(best) = screened.first() else {
             return Vec::new();
         };
-        let is_at_other = |s: &Screened| probes[s.hypothesis.parts[0].probe].is_at_other_sensor(own);
+        let is_at_other = |s: &Screened| probes[s.probe()].is_at_other_sensor(own);
         (screened.iter())
             .filter(|s| is_at_other(s) && s.score > 0.0 && s.may_win(best, SHARE))
             .map(|s| s.hypothesis.clone())

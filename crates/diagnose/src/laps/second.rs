@@ -3,9 +3,9 @@
 use super::hunt::Moved;
 use super::hypothesis::Hypothesis;
 use super::pairs::Tried;
-use super::rounds::{ROUNDS_BESIDE, ROUNDS_OF_LITTLE, ROUNDS_OF_SEVERAL};
+use super::rounds::{ROUNDS_BESIDE, ROUNDS_OF_LITTLE, best_of};
 use super::screen::Screened;
-use super::search::{Found, Search, sort};
+use super::search::{Found, Search};
 use super::verdict::{ALL_BUT_FAULTS, faults_beside, is_worth_its_numbers, stands_alone, suffices};
 
 /// What could go with a single effect, by what it explains of that one's remainder.
@@ -35,6 +35,7 @@ impl Search<'_> {
         if !stands_alone(&single.explanation) && !single.explanation.fits() && !tried.fits() {
             self.descend_on(&mut tried, self.pairs_about(single));
         }
+        let mut promises = false;
         if !tried.fits() {
             match self.promise_beside(single) {
                 Promise::None => {}
@@ -42,46 +43,57 @@ impl Search<'_> {
                 Promise::Little(_) if jumps => {}
                 Promise::Little(pairs) => {
                     let descents = self.descend(pairs.iter(), &ROUNDS_OF_LITTLE, f64::NEG_INFINITY);
-                    return self.settle_roughly(descents);
+                    return self.settle_roughly(&self.hunted_again(descents, Moved::Far));
                 }
                 Promise::Enough(pairs) => {
                     if let Some(closer) = self.with_closer_sizes(single) {
                         found.insert(0, closer);
                         return self.pairs_with_first(found);
                     }
+                    promises = true;
                     self.descend_on(&mut tried, pairs);
                     if stands_alone(&single.explanation) {
                         // What is not worth its numbers lacks no other name.
-                        let ends = self.settle_roughly(tried.descents().to_vec());
+                        let ends = self.settle_roughly_tried(&mut tried);
                         let is_worth_it =
                             |pair: &Found| is_worth_its_numbers(&single.explanation, &pair.explanation);
                         if !ends.iter().any(is_worth_it) {
                             return ends;
                         }
                     }
-                    if !jumps && surely_lacks && !tried.fits() {
-                        self.descend_on(&mut tried, self.jumping_beside(found.iter()));
-                    }
                 }
             }
         }
-        let pairs = self.with_exchanged(tried);
-        self.with_pairs_without(single, reached, pairs)
+        // Two effects that have nothing of the single one may do together what it does nearly.
+        if self.lacks_more_than_faults(single) && !tried.fits() {
+            self.try_together(&mut tried);
+        }
+        if promises && !jumps && surely_lacks && !tried.fits() {
+            self.descend_on(&mut tried, self.jumping_beside(found.iter()));
+        }
+        let certain = Self::certain_in(&tried, found);
+        self.with_exchanged_beside(tried, certain)
     }
 
-    /// Pairs, those that go with a single effect; where none of them fits and that one surely leaves something of a strong signal, the
-    /// pairs that are looked for together too: two effects that have nothing of the single one may do together what it does nearly.
-    fn with_pairs_without(&self, single: &Found, reached: f64, mut pairs: Vec<Found>) -> Vec<Found> {
+    /// The probe of the first of some single effects, where the best of several effects has it and leaves nothing significant, and no other
+    /// single effect explains nearly as much: it is not to be exchanged for others.
+    fn certain_in(tried: &Tried, found: &[Found]) -> Option<usize> {
+        const NEARLY: f64 = 0.97;
+        let (first, others) = found.split_first()?;
+        let score = |found: &Found| found.explanation.score;
+        let is_rival = |other: &Found| {
+            other.explanation.names() != first.explanation.names() && score(other) > NEARLY * score(first)
+        };
+        let probe = first.hypothesis.parts[0].probe;
+        let best = best_of(tried.descents())?;
+        let has_it = best.hypothesis.parts.iter().any(|part| part.probe == probe);
+        (has_it && best.fits() && !others.iter().any(is_rival)).then_some(probe)
+    }
+
+    /// Whether a single effect surely leaves something of a strong signal that is more than faults of models.
+    fn lacks_more_than_faults(&self, single: &Found) -> bool {
         let single = &single.explanation;
-        let lacks_more_than_faults = !suffices(single) && single.share < ALL_BUT_FAULTS;
-        let fits = |pair: &Found| pair.explanation.fits();
-        if lacks_more_than_faults && self.is_strong() && !pairs.first().is_some_and(fits) {
-            let mut tried = Tried::new(&ROUNDS_OF_SEVERAL, reached);
-            self.try_together(&mut tried);
-            pairs.extend(self.settle_tried(tried));
-            sort(&mut pairs);
-        }
-        pairs
+        self.is_strong() && !suffices(single) && single.share < ALL_BUT_FAULTS
     }
 
     /// What explains best what a single effect leaves, if anything gains there what a further effect must, and a fair share of what the

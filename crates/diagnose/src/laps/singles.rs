@@ -46,7 +46,7 @@ impl Search<'_> {
         let Some(best) = screened.first().filter(|best| best.score < WEAK) else {
             return Vec::new();
         };
-        let probe = |s: &Screened| &self.atlas().probes[s.hypothesis.parts[0].probe];
+        let probe = |s: &Screened| &self.atlas().probes[s.probe()];
         let mut heard: Vec<&Screened> = Vec::new();
         for candidate in screened {
             let known = |other: &&Screened| probe(other).acts_like(probe(candidate));
@@ -81,14 +81,13 @@ impl Search<'_> {
         let Some(best) = screened.first() else {
             return Vec::new();
         };
-        let probe = |s: &Screened| s.hypothesis.parts[0].probe;
-        let spec = |s: &Screened| self.atlas().probes[probe(s)].spec;
+        let spec = |s: &Screened| self.atlas().probes[s.probe()].spec;
         let mut list: Vec<&Screened> = Vec::new();
         for candidate in screened {
             if list.len() == MOST {
                 break;
             }
-            let share = if self.atlas().probes[probe(candidate)].has_place() {
+            let share = if self.atlas().probes[candidate.probe()].has_place() {
                 0.4
             } else {
                 0.7
@@ -96,7 +95,7 @@ impl Search<'_> {
             if !candidate.may_win(best, share) {
                 continue;
             }
-            let of_probe = |s: &&&Screened| probe(s) == probe(candidate);
+            let of_probe = |s: &&&Screened| s.probe() == candidate.probe();
             // A size by run may come first by the faults of a path alone.
             let plain = |s: &Screened| s.hypothesis.is_constant();
             let seen = list
