@@ -35,20 +35,18 @@ impl Rung {
         Self { behind_one, ..self }
     }
 
-    /// The share of a best score that leaves nothing significant: what is behind it is told apart by what it leaves.
-    fn share_of_fitting(&self) -> f64 {
-        const LESS: f64 = 0.2;
-        LESS * self.share
-    }
-
-    /// The log-likelihood behind a best one of so many numbers, which `fits` where it leaves nothing significant.
-    fn behind_a_best_of(&self, numbers: usize, fits: bool) -> f64 {
+    /// The log-likelihood by which a descent may be behind a best one of so many numbers, with a score that is to be reached; less where
+    /// the best `fits`, and leaves nothing significant: what is behind it is told apart by what it leaves.
+    fn allowed_behind(&self, numbers: usize, score: f64, fits: bool) -> f64 {
         const FITTING: f64 = 15.0;
-        match numbers {
+        const LESS: f64 = 0.2;
+        let behind = match numbers {
             0 | 1 => self.behind_one,
             _ if fits => self.behind.min(FITTING),
             _ => self.behind,
-        }
+        };
+        let share = if fits { LESS * self.share } else { self.share };
+        behind.max(share * score)
     }
 }
 
@@ -144,11 +142,10 @@ impl Search<'_> {
             };
             let (best, error) = (first.score, first.score_error);
             let (hopeless, fits) = (is_hopeless(first), first.fits());
-            let behind = rung.behind_a_best_of(first.hypothesis.fitted(self.atlas()), fits);
             let bar = best.max(reached);
+            let behind = rung.allowed_behind(first.hypothesis.fitted(self.atlas()), bar, fits);
             let may_be_chance = |d: &Descent| ERRORS_BEHIND * error.hypot(d.score_error);
-            let share = if fits { rung.share_of_fitting() } else { rung.share };
-            alive.retain(|d| d.within_reach() >= bar - behind.max(share * bar).max(may_be_chance(d)));
+            alive.retain(|d| d.within_reach() >= bar - behind.max(may_be_chance(d)));
             alive = self.without_repeats(alive, |descent| &descent.hypothesis);
             if fits {
                 let others = alive.split_off(FEW.min(alive.len()));
