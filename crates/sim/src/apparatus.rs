@@ -5,9 +5,9 @@ use std::sync::Arc;
 use track::Vec2;
 
 use crate::cast::{Hits, Rays};
-use crate::effects::{Active, Chain, Hit, Hook, Stage};
+use crate::effects::{Active, Chain, Hook, RayHits, Stage};
 use crate::world::{Geometry, World, altered};
-use crate::{Error, Machine, Pose, Setting};
+use crate::{Error, Machine, Pose, Readings, Setting};
 
 /// The rays that one ray of the beam makes on all eight sensors, in the body frame.
 #[derive(Debug, Clone, Copy)]
@@ -53,7 +53,7 @@ impl<'w> Apparatus<'w> {
             drifting: all.iter().any(Active::drifts),
             remade: (all.iter()).any(|active| active.drifts() && active.effect.on_machine().is_some()),
             machine,
-            weighs_rays: effects.has(Hook::RayFactor),
+            weighs_rays: effects.has(Hook::RayFactors),
             effects,
             steps: 0,
         })
@@ -113,24 +113,21 @@ impl<'w> Apparatus<'w> {
         (rays, hits)
     }
 
-    /// What the effects make of one ray's response.
-    pub(crate) fn ray_factor(&self, rays: &Rays, hits: &Hits, lane: usize) -> f64 {
-        self.effects.ray_factor(&self.hit(rays, hits, lane).0)
+    /// What the effects make of the responses of the rays; anything of one that met no wall.
+    #[inline]
+    pub(crate) fn ray_factors(&self, rays: &Rays, hits: &Hits) -> Readings {
+        self.effects.ray_factors(&self.ray_hits(rays, hits))
     }
 
-    /// Where one ray met a wall, and the ray's direction along the wall's normal.
-    pub(crate) fn hit(&self, rays: &Rays, hits: &Hits, lane: usize) -> (Hit, f64) {
-        let (walls, segment) = (&self.geometry.walls, hits.segment[lane] as usize);
-        let (direction, distance_m) = (rays.direction(lane), hits.distance_m[lane]);
-        let towards = walls.normal(segment).dot(direction);
-        let place = walls.place(segment, rays.origin(lane) + direction * distance_m);
-        let hit = Hit {
-            sensor: lane,
-            distance_m,
-            cos_incidence: towards.abs().min(1.0),
-            site: self.world.scene.site(place),
-        };
-        (hit, towards)
+    /// What rays met, as effects see it.
+    #[inline]
+    pub(crate) fn ray_hits<'a>(&'a self, rays: &'a Rays, hits: &'a Hits) -> RayHits<'a> {
+        RayHits {
+            scene: self.world.scene,
+            walls: &self.geometry.walls,
+            rays,
+            hits,
+        }
     }
 }
 

@@ -120,7 +120,7 @@ impl<'w> Forecast<'w> {
             || mine.beam != theirs.beam;
         let responses = mine.range_m != theirs.range_m || mine.response != theirs.response;
         let places = self.apparatus.weighs_rays
-            || others.has(Hook::RayFactor)
+            || others.has(Hook::RayFactors)
             || !self.apparatus.displacing.is_empty();
         // A look knows one ray of a sensor.
         let several = mine.beam.rays().len() > 1;

@@ -30,8 +30,8 @@ pub use cast::{Caster, CasterKind, Hits, LANES, Rays, segment_distance_m};
 pub use controller::Controller;
 pub use cut::{max_error_for, segment_count};
 pub use effects::{
-    Area, EFFECTS, Effect, Hit, Hook, Moment, Param, Pattern, Setting, Site, Spec, Stage, UNLISTED, find,
-    unlisted_area, unlisted_at, unlisted_on_floor,
+    Area, EFFECTS, Effect, Hit, Hook, Moment, Param, Pattern, RayHits, Setting, Site, Spec, Stage, UNLISTED,
+    find, unlisted_area, unlisted_at, unlisted_on_floor,
 };
 pub use error::Error;
 pub use forecast::{Forecast, Motion, PoseMatrix};

@@ -198,7 +198,7 @@ impl Apparatus<'_> {
         Places(std::array::from_fn(|lane| {
             hits.distance_m[lane]
                 .is_finite()
-                .then(|| self.hit(rays, hits, lane))
+                .then(|| self.ray_hits(rays, hits).hit_with_direction(lane))
         }))
     }
 

@@ -120,7 +120,7 @@ impl<'w> Run<'w> {
     #[cfg(test)]
     pub(crate) fn call_every_hook(&mut self) {
         self.apparatus.effects.call_every_hook();
-        self.apparatus.weighs_rays = self.apparatus.effects.has(Hook::RayFactor);
+        self.apparatus.weighs_rays = self.apparatus.effects.has(Hook::RayFactors);
     }
 
     /// Drives for one control step.
@@ -202,9 +202,11 @@ impl<'w> Run<'w> {
                 *value = if distance_m <= *range_m { *value } else { 0.0 };
             }
             if self.apparatus.weighs_rays {
-                for lane in (0..LANES).filter(|&lane| hits.distance_m[lane] <= *range_m) {
-                    values[lane] *= self.apparatus.ray_factor(&rays, &hits, lane);
-                }
+                let factors = self.apparatus.ray_factors(&rays, &hits);
+                values
+                    .iter_mut()
+                    .zip(factors)
+                    .for_each(|(value, factor)| *value *= factor);
             }
             for lane in 0..LANES {
                 total[lane] += sight.weight * values[lane];
@@ -226,8 +228,9 @@ impl<'w> Run<'w> {
                 *mean += sight.weight * d.min(*range_m);
             }
             if self.apparatus.weighs_rays {
+                let factors = self.apparatus.ray_factors(&rays, &hits);
                 for lane in (0..LANES).filter(|&lane| hits.distance_m[lane] <= *range_m) {
-                    factor[lane] += sight.weight * (self.apparatus.ray_factor(&rays, &hits, lane) - 1.0);
+                    factor[lane] += sight.weight * (factors[lane] - 1.0);
                 }
             }
         }

@@ -113,7 +113,7 @@ impl Response {
 /// x^p for x >= 0, within 1e-13 of it: 2^(p log2 x). Written without branches and library calls, so that eight of them
 /// fill the processor's lanes and every machine computes the same bits; short chains, because the robot waits for it.
 #[inline(always)]
-fn power(x: f64, p: f64) -> f64 {
+pub(crate) fn power(x: f64, p: f64) -> f64 {
     let value = exp2(
         p * log2(if x > f64::MIN_POSITIVE {
             x

@@ -158,9 +158,20 @@ impl Walls {
         self.normals[segment]
     }
 
+    /// Which wall a segment is a piece of.
+    #[inline]
+    pub(crate) fn side(&self, segment: usize) -> Side {
+        self.piece(segment).side
+    }
+
+    #[inline]
+    fn piece(&self, segment: usize) -> Piece {
+        self.pieces[segment].expect("a caster returns numbers of segments")
+    }
+
     /// The place on the exact wall that a point of a segment stands for.
     pub fn place(&self, segment: usize, point: Vec2) -> WallPlace {
-        let piece = self.pieces[segment].expect("a caster returns numbers of segments");
+        let piece = self.piece(segment);
         let (a, b) = (self.vertex(segment), self.vertex(segment + 1));
         let along =
             ((point - a).dot(b - a) / (b - a).length_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);

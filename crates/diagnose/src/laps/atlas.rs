@@ -107,7 +107,7 @@ impl Clone for Spent {
 impl Atlas {
     /// Changes whenever the numbers of an atlas of the same model mean something else: atlases of another recipe are not to be
     /// read.
-    pub const RECIPE: u32 = 11;
+    pub const RECIPE: u32 = 12;
 
     /// Simulates everything for one recording; `cuts` simulate the declared model with walls that another program may have
     /// cut, which is no departure from it; `alike` says whether the declared model does the same in every run, whose physics steps

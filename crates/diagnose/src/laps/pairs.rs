@@ -4,7 +4,7 @@ use nalgebra::{Matrix2, Vector2};
 use rayon::prelude::*;
 
 use super::atlas::Atlas;
-use super::hunt::{Hunt, Moved};
+use super::hunt::Hunt;
 use super::hypothesis::Hypothesis;
 use super::part::{Part, Shape};
 use super::pieces::ScreenedPair;
@@ -21,8 +21,6 @@ pub(super) struct Tried {
     reached: f64,
     starts: Vec<Hypothesis>,
     descents: Vec<Descent>,
-    /// How far effects may have moved since the sizes that jump beside them were found.
-    moved: Moved,
 }
 
 impl Tried {
@@ -32,7 +30,6 @@ impl Tried {
             reached,
             starts: Vec::new(),
             descents: Vec::new(),
-            moved: Moved::Far,
         }
     }
 
@@ -177,11 +174,7 @@ impl Search<'_> {
     /// Descends from further hypotheses.
     pub(super) fn descend_on(&self, tried: &mut Tried, further: Vec<Hypothesis>) {
         let best = best_of(&tried.descents).map_or(tried.reached, |best| best.score);
-        let descents = self.descend_several(&further, tried.rounds, best);
-        if best_of(&descents).is_some_and(|further| further.score > best) {
-            tried.moved = Moved::Far;
-        }
-        tried.descents.extend(descents);
+        (tried.descents).extend(self.descend_several(&further, tried.rounds, best));
         tried.starts.extend(further);
     }
 
@@ -200,17 +193,10 @@ impl Search<'_> {
     /// none.
     pub(super) fn settle_tried(&self, tried: Tried) -> Vec<Found> {
         if tried.may_be_better() {
-            self.settle_moved(tried.descents, tried.moved)
+            self.settle(tried.descents)
         } else {
             Vec::new()
         }
-    }
-
-    /// Where descents led, with sizes that jump brought to rest, without telling rivals apart any closer.
-    pub(super) fn settle_roughly_tried(&self, tried: &mut Tried) -> Vec<Found> {
-        tried.descents = self.hunted_again(std::mem::take(&mut tried.descents), tried.moved);
-        tried.moved = Moved::Little;
-        self.settle_roughly(&tried.descents)
     }
 
     /// Adds pairs with either effect of the best one exchanged for others than were tried, and then the effects that were not kept so far

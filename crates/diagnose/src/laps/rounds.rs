@@ -198,17 +198,21 @@ impl Search<'_> {
 
     /// The ends of descents simulated often enough to judge them, best first.
     pub(super) fn settle(&self, descents: Vec<Descent>) -> Vec<Found> {
-        self.settle_moved(descents, Moved::Far)
+        self.settle_hunted(&self.hunted_again(descents, Moved::Far))
     }
 
-    /// The same of descents from where sizes that jump had come to rest beside others that have moved so far since.
-    pub(super) fn settle_moved(&self, descents: Vec<Descent>, moved: Moved) -> Vec<Found> {
-        self.sorted(&self.closer(self.ends(&self.hunted_again(descents, moved))))
+    /// The same of descents from where sizes that jump had come to rest beside others that have moved little since.
+    pub(super) fn settle_near(&self, descents: Vec<Descent>) -> Vec<Found> {
+        self.settle_hunted(&self.hunted_again(descents, Moved::Little))
     }
 
-    /// The same of what may be listed but hardly claimed, once sizes that jump came to rest: rivals are not told apart any closer.
-    pub(super) fn settle_roughly(&self, hunted: &[Descent]) -> Vec<Found> {
-        self.sorted(&self.ends(hunted))
+    /// The same of what may be listed but hardly claimed: rivals are not told apart any closer.
+    pub(super) fn settle_roughly(&self, descents: Vec<Descent>) -> Vec<Found> {
+        self.sorted(&self.ends(&self.hunted_again(descents, Moved::Far)))
+    }
+
+    fn settle_hunted(&self, descents: &[Descent]) -> Vec<Found> {
+        self.sorted(&self.closer(self.ends(descents)))
     }
 
     /// The ends of descents, those near the best judged together.
@@ -230,7 +234,7 @@ impl Search<'_> {
 
     /// Descents with better sizes of the effects that jump, which were found beside others that have moved since: those of the best
     /// descent, for those that are near it, until they come to rest or no longer matter; and those of rivals, for themselves.
-    pub(super) fn hunted_again(&self, mut descents: Vec<Descent>, at_first: Moved) -> Vec<Descent> {
+    fn hunted_again(&self, mut descents: Vec<Descent>, at_first: Moved) -> Vec<Descent> {
         /// Share of the best score by which a descent may lie behind it and still follow at the first look, log-likelihood by which it
         /// may later, and how many do.
         const SHARE: f64 = 0.03;

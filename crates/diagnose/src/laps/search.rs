@@ -9,7 +9,6 @@ use std::sync::OnceLock;
 use sim::Vec2;
 
 use super::atlas::{Atlas, White};
-use super::hunt::Moved;
 use super::hypothesis::Hypothesis;
 use super::intervals::Interval;
 use super::observed::ObservedRun;
@@ -176,10 +175,7 @@ impl Search<'_> {
         };
         let starts = (0..hypothesis.parts.len()).flat_map(exchanged).filter(is_new);
         let starts: Vec<Hypothesis> = starts.collect();
-        self.settle_moved(
-            self.descend(starts.iter(), &ROUNDS, f64::NEG_INFINITY),
-            Moved::Little,
-        )
+        self.settle_near(self.descend(starts.iter(), &ROUNDS, f64::NEG_INFINITY))
     }
 
     /// Explanations near the best with the same effects at the other sensors, tried to the end: of one effect two were so far.
@@ -208,7 +204,7 @@ impl Search<'_> {
         let rounds: &[Rung] = if several { &ROUNDS_BESIDE } else { &ROUNDS };
         let mut descents = self.descend(starts.iter(), rounds, best);
         descents.retain(|descent| descent.score > best - BEHIND.max(ERRORS * descent.score_error));
-        self.settle_moved(descents, Moved::Little)
+        self.settle_near(descents)
     }
 
     /// The effect of a part at the other sensors where it may win by what it explains, beside some effects, of what these leave; none of

@@ -43,7 +43,7 @@ impl Search<'_> {
                 Promise::Little(_) if jumps => {}
                 Promise::Little(pairs) => {
                     let descents = self.descend(pairs.iter(), &ROUNDS_OF_LITTLE, f64::NEG_INFINITY);
-                    return self.settle_roughly(&self.hunted_again(descents, Moved::Far));
+                    return self.settle_roughly(descents);
                 }
                 Promise::Enough(pairs) => {
                     if let Some(closer) = self.with_closer_sizes(single) {
@@ -54,7 +54,7 @@ impl Search<'_> {
                     self.descend_on(&mut tried, pairs);
                     if stands_alone(&single.explanation) {
                         // What is not worth its numbers lacks no other name.
-                        let ends = self.settle_roughly_tried(&mut tried);
+                        let ends = self.settle_roughly(tried.descents().to_vec());
                         let is_worth_it =
                             |pair: &Found| is_worth_its_numbers(&single.explanation, &pair.explanation);
                         if !ends.iter().any(is_worth_it) {

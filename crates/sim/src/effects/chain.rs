@@ -2,7 +2,8 @@
 
 use track::Vec2;
 
-use super::{Active, Effect, Hit, Hook, Moment};
+use super::{Active, Effect, Hit, Hook, Moment, RayHits};
+use crate::cast::LANES;
 use crate::{Error, Machine, Readings, Setting, Twist, WheelSpeeds};
 
 /// Effects in the order in which they act. Of each only the hooks that it has are called: a call that does nothing costs a
@@ -85,8 +86,17 @@ impl Chain {
     /// Factor on the response to a hit.
     #[inline]
     pub(crate) fn ray_factor(&self, hit: &Hit) -> f64 {
-        self.each(Hook::RayFactor, 1.0, |effect, values, factor| {
+        self.each(Hook::RayFactors, 1.0, |effect, values, factor| {
             factor * effect.ray_factor(values, hit)
+        })
+    }
+
+    /// Factors on the responses of eight rays; anything of a ray that met no wall.
+    #[inline]
+    pub(crate) fn ray_factors(&self, hits: &RayHits<'_>) -> Readings {
+        self.each(Hook::RayFactors, [1.0; LANES], |effect, values, mut factors| {
+            effect.ray_factors(values, hits, &mut factors);
+            factors
         })
     }
 

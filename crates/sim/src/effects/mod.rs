@@ -10,6 +10,7 @@ mod chain;
 mod decide;
 mod observe;
 mod plain;
+mod ray_hits;
 mod rays;
 mod sense;
 mod setting;
@@ -26,6 +27,7 @@ use track::Vec2;
 
 pub use area::Area;
 pub(crate) use chain::Chain;
+pub use ray_hits::RayHits;
 pub(crate) use setting::Active;
 pub use setting::{Pattern, Setting};
 pub use unlisted::{UNLISTED, unlisted_area, unlisted_at, unlisted_on_floor};
@@ -288,8 +290,8 @@ pub struct Hit {
 /// A place in the tick where an effect may act: one of the methods of [`Effect`] that are called while a robot drives.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Hook {
-    /// [`Effect::ray_factor`].
-    RayFactor,
+    /// [`Effect::ray_factors`].
+    RayFactors,
     /// [`Effect::readings`].
     Readings,
     /// [`Effect::noisy_readings`].
@@ -311,7 +313,7 @@ pub enum Hook {
 impl Hook {
     /// All of them, in the order of their numbers.
     pub const ALL: [Self; 9] = [
-        Self::RayFactor,
+        Self::RayFactors,
         Self::Readings,
         Self::NoisyReadings,
         Self::Drive,
@@ -345,6 +347,13 @@ pub trait Effect: Debug + Send {
     /// Factor on the response of one ray.
     fn ray_factor(&self, _values: &[f64], _hit: &Hit) -> f64 {
         1.0
+    }
+    /// Puts the factors on the responses of eight rays on those that others put there: [`Effect::ray_factor`] of each, which it must
+    /// be if it is computed otherwise, for all at once. Rays that met no wall may get any.
+    fn ray_factors(&self, values: &[f64], hits: &RayHits<'_>, factors: &mut Readings) {
+        for lane in hits.lanes() {
+            factors[lane] *= self.ray_factor(values, &hits.hit(lane));
+        }
     }
     /// Changes the readings before noise.
     fn readings(&mut self, _values: &[f64], _now: &Moment, _machine: &Machine, _readings: &mut Readings) {}

@@ -37,7 +37,7 @@ pub(super) struct OnRays(pub(super) fn(&[f64], &Hit) -> f64);
 
 impl Effect for OnRays {
     fn hooks(&self) -> &'static [Hook] {
-        &[Hook::RayFactor]
+        &[Hook::RayFactors]
     }
     fn ray_factor(&self, values: &[f64], hit: &Hit) -> f64 {
         (self.0)(values, hit)

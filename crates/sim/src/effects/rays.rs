@@ -2,8 +2,10 @@
 
 use super::plain::{OnMachine, OnRays};
 use super::world::{WALLS, gaussian, is_wall};
-use super::{Param, Spec, Stage};
-use crate::{Beam, Combine};
+use super::{Effect, Hit, Hook, Param, RayHits, Spec, Stage};
+use crate::cast::LANES;
+use crate::sensor::power;
+use crate::{Beam, Combine, Readings};
 use track::Side;
 
 /// Rays of a cone with fewer declared.
@@ -88,8 +90,65 @@ pub(super) const INCIDENCE_FALLOFF: Spec = Spec {
     summary: "each ray's response times |cos(angle between ray and wall normal)|^exponent",
     params: &[Param::new("exponent", "", 0.0, 0.0, 10.0)],
     list: None,
-    build: || Box::new(OnRays(|values, hit| hit.cos_incidence.powf(values[0]))),
+    build: || Box::new(IncidenceFalloff),
 };
+
+#[derive(Debug)]
+struct IncidenceFalloff;
+
+impl IncidenceFalloff {
+    #[inline(always)]
+    fn factor(exponent: f64, cos_incidence: f64) -> f64 {
+        const LEAST: f64 = f64::MIN_POSITIVE;
+        // 0^0 is 1 too: without falloff nothing changes.
+        power(
+            if cos_incidence > LEAST {
+                cos_incidence
+            } else {
+                LEAST
+            },
+            exponent,
+        )
+    }
+}
+
+impl Effect for IncidenceFalloff {
+    fn hooks(&self) -> &'static [Hook] {
+        &[Hook::RayFactors]
+    }
+    fn ray_factor(&self, values: &[f64], hit: &Hit) -> f64 {
+        Self::factor(values[0], hit.cos_incidence)
+    }
+    fn ray_factors(&self, values: &[f64], hits: &RayHits<'_>, factors: &mut Readings) {
+        let exponent = values[0];
+        let own = hits.cos_incidence().map(|cos| Self::factor(exponent, cos));
+        for lane in 0..LANES {
+            factors[lane] *= own[lane];
+        }
+    }
+}
+
+/// A factor on the response of rays that hit one of the walls.
+#[derive(Debug)]
+struct WallReflectance(Side);
+
+impl Effect for WallReflectance {
+    fn hooks(&self) -> &'static [Hook] {
+        &[Hook::RayFactors]
+    }
+    fn ray_factor(&self, values: &[f64], hit: &Hit) -> f64 {
+        if hit.site.place.side == self.0 {
+            values[0]
+        } else {
+            1.0
+        }
+    }
+    fn ray_factors(&self, values: &[f64], hits: &RayHits<'_>, factors: &mut Readings) {
+        for lane in hits.lanes() {
+            factors[lane] *= if hits.side(lane) == self.0 { values[0] } else { 1.0 };
+        }
+    }
+}
 
 /// The response of rays that hit the outer wall.
 pub(super) const OUTER_WALL_REFLECTANCE: Spec = Spec {
@@ -98,15 +157,7 @@ pub(super) const OUTER_WALL_REFLECTANCE: Spec = Spec {
     summary: "the response of rays that hit the outer wall times factor",
     params: &[Param::new("factor", "", 1.0, 0.0, 10.0)],
     list: None,
-    build: || {
-        Box::new(OnRays(|values, hit| {
-            if hit.site.place.side == Side::Outer {
-                values[0]
-            } else {
-                1.0
-            }
-        }))
-    },
+    build: || Box::new(WallReflectance(Side::Outer)),
 };
 
 /// The response of rays that hit the inner wall.
@@ -116,15 +167,7 @@ pub(super) const INNER_WALL_REFLECTANCE: Spec = Spec {
     summary: "the response of rays that hit the inner wall times factor",
     params: &[Param::new("factor", "", 1.0, 0.0, 10.0)],
     list: None,
-    build: || {
-        Box::new(OnRays(|values, hit| {
-            if hit.site.place.side == Side::Inner {
-                values[0]
-            } else {
-                1.0
-            }
-        }))
-    },
+    build: || Box::new(WallReflectance(Side::Inner)),
 };
 
 /// A bright or dark place on a wall: 1 + (factor - 1) times a Gaussian in arc length.

@@ -2,8 +2,8 @@ use proptest::prelude::*;
 use track::{Side, Vec2};
 
 use super::super::testing::{active, declared, scene, silent, steps, with};
-use super::super::{Hit, Site};
-use crate::{Machine, Model, Pose, Readings, WallPlace, segment_distance_m};
+use super::super::{Active, Hit, RayHits, Site};
+use crate::{Caster, LANES, Machine, Model, Pose, Rays, Readings, WallPlace, segment_distance_m};
 
 fn altered(name: &str, values: &[f64]) -> Machine {
     let (active, mut machine) = (active(name, values), declared().machine);
@@ -107,6 +107,55 @@ fn incidence_and_reflectance_of_a_run() {
     compare("inner-wall-reflectance", &[0.4], 0.0, of(Side::Inner, 0.4));
 }
 
+#[test]
+fn factors_of_eight_rays_are_those_of_each() {
+    let (walls, machine) = (scene().walls(), silent().machine);
+    let caster = Caster::new(None, walls, 0.1, 0.05);
+    let mut met = 0;
+    for (name, value) in [
+        ("incidence-falloff", 0.0),
+        ("incidence-falloff", 0.7),
+        ("outer-wall-reflectance", 0.4),
+        ("inner-wall-reflectance", 1.3),
+    ] {
+        let Active { effect, values, .. } = active(name, &[value]);
+        for seed in 0..20 {
+            let pose = steps(&silent(), 0, seed, 1)[0].0;
+            let rays = Rays::new(machine.mounts.map(|mount| (mount.position, mount.axis()))).placed(pose);
+            let hits = caster.cast(walls, pose.position, &rays);
+            let hits = RayHits {
+                scene: scene(),
+                walls,
+                rays: &rays,
+                hits: &hits,
+            };
+            let mut factors = [2.0; LANES];
+            effect.ray_factors(&values, &hits, &mut factors);
+            for lane in hits.lanes() {
+                met += 1;
+                assert_eq!(
+                    factors[lane],
+                    2.0 * effect.ray_factor(&values, &hits.hit(lane)),
+                    "{name}"
+                );
+            }
+        }
+    }
+    assert!(met > 100, "{met} walls met");
+}
+
+#[test]
+fn without_falloff_a_wall_seen_edge_on_sends_back_as_much() {
+    let Active { effect, values, .. } = active("incidence-falloff", &[0.0]);
+    let hit = Hit {
+        sensor: 0,
+        distance_m: 0.05,
+        cos_incidence: 0.0,
+        site: site(Side::Outer, 0.5),
+    };
+    assert_eq!(effect.ray_factor(&values, &hit), 1.0);
+}
+
 /// A flat wall straight ahead at d: the ray at angle a sees d / cos a. The mean over the cone by a fine sum.
 #[test]
 fn cone_over_a_flat_wall() {
@@ -145,12 +194,15 @@ fn cone_of_a_run_is_the_mean_over_its_rays() {
     assert!(rays.rays().len() >= 7);
 }
 
-fn patch(values: &[f64], side: Side, fraction: f64) -> f64 {
-    let site = Site {
+fn site(side: Side, fraction: f64) -> Site {
+    Site {
         place: WallPlace { side, fraction },
         wall_length_m: 4.0,
         outward: 1.0,
-    };
+    }
+}
+
+fn patch(values: &[f64], side: Side, fraction: f64) -> f64 {
     let active = active("reflectance-patch", values);
     active.effect.ray_factor(
         &active.values,
@@ -158,7 +210,7 @@ fn patch(values: &[f64], side: Side, fraction: f64) -> f64 {
             sensor: 0,
             distance_m: 0.05,
             cos_incidence: 1.0,
-            site,
+            site: site(side, fraction),
         },
     )
 }

@@ -1,0 +1,78 @@
+//! What eight rays met, for effects on what walls send back.
+
+use track::Side;
+
+use super::Hit;
+use crate::cast::{Hits, LANES, Rays};
+use crate::{Scene, Walls};
+
+/// What eight rays, one of each sensor, met: each thing is computed where it is asked for.
+#[derive(Debug, Clone, Copy)]
+pub struct RayHits<'a> {
+    pub(crate) scene: &'a Scene,
+    pub(crate) walls: &'a Walls,
+    pub(crate) rays: &'a Rays,
+    pub(crate) hits: &'a Hits,
+}
+
+impl RayHits<'_> {
+    /// The rays that met a wall.
+    pub fn lanes(&self) -> impl Iterator<Item = usize> + '_ {
+        (0..LANES).filter(|&lane| self.hits.distance_m[lane] < f64::INFINITY)
+    }
+
+    /// Cosine of the angle between each ray and the wall's normal, in [0, 1]; anything of a ray that met none.
+    #[inline]
+    pub fn cos_incidence(&self) -> [f64; LANES] {
+        let normals = self
+            .hits
+            .segment
+            .map(|segment| self.walls.normal(segment as usize));
+        let Rays {
+            direction_x,
+            direction_y,
+            ..
+        } = self.rays;
+        let (normal_x, normal_y) = (normals.map(|n| n.x), normals.map(|n| n.y));
+        let mut cos = [0.0; LANES];
+        for i in 0..LANES {
+            let towards = (normal_x[i] * direction_x[i] + normal_y[i] * direction_y[i]).abs();
+            cos[i] = if towards < 1.0 { towards } else { 1.0 };
+        }
+        cos
+    }
+
+    /// Which wall a ray met.
+    #[inline]
+    pub fn side(&self, lane: usize) -> Side {
+        self.walls.side(self.hits.segment[lane] as usize)
+    }
+
+    /// Where a ray met a wall.
+    #[inline]
+    pub fn hit(&self, lane: usize) -> Hit {
+        self.hit_with_direction(lane).0
+    }
+
+    /// The same with the ray's direction along the wall's normal.
+    #[inline]
+    pub(crate) fn hit_with_direction(&self, lane: usize) -> (Hit, f64) {
+        let Self {
+            scene,
+            walls,
+            rays,
+            hits,
+        } = self;
+        let segment = hits.segment[lane] as usize;
+        let (direction, distance_m) = (rays.direction(lane), hits.distance_m[lane]);
+        let towards = walls.normal(segment).dot(direction);
+        let place = walls.place(segment, rays.origin(lane) + direction * distance_m);
+        let hit = Hit {
+            sensor: lane,
+            distance_m,
+            cos_incidence: towards.abs().min(1.0),
+            site: scene.site(place),
+        };
+        (hit, towards)
+    }
+}
