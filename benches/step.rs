@@ -40,8 +40,10 @@ fn main() {
             &wide,
         );
     }
-    let effects: [&[(&str, &[f64])]; 3] = [
+    let effects: [&[(&str, &[f64])]; 5] = [
         &[("reading-gain", &[1.02])],
+        &[("incidence-falloff", &[0.9])],
+        &[("outer-wall-reflectance", &[0.97])],
         &[("slip-level", &[1.5])],
         &[("sensor-lag", &[0.1]), ("camera-offset", &[0.001, 0.0])],
     ];
