@@ -348,8 +348,8 @@ pub trait Effect: Debug + Send {
     fn ray_factor(&self, _values: &[f64], _hit: &Hit) -> f64 {
         1.0
     }
-    /// Puts the factors on the responses of eight rays on those that others put there: [`Effect::ray_factor`] of each, which it must
-    /// be if it is computed otherwise, for all at once. Rays that met no wall may get any.
+    /// Multiplies factors on the responses of eight rays by [`Effect::ray_factor`] of each; an effect that computes them faster all at
+    /// once gives the same bits. Rays that met no wall may get any.
     fn ray_factors(&self, values: &[f64], hits: &RayHits<'_>, factors: &mut Readings) {
         for lane in hits.lanes() {
             factors[lane] *= self.ray_factor(values, &hits.hit(lane));
