@@ -281,8 +281,7 @@ impl Apparatus<'_> {
     #[inline]
     fn doubt(&self, pose: Pose, covariance: &PoseMatrix, rays: &Rays, hits: &Hits) -> Doubt {
         let walls = &self.geometry.walls;
-        let normals = hits.segment.map(|segment| walls.normal(segment as usize));
-        let (normal_x, normal_y) = (normals.map(|n| n.x), normals.map(|n| n.y));
+        let (normal_x, normal_y) = walls.normals(hits.segment);
         let met = hits.distance_m.map(|d| if d < f64::INFINITY { 1.0 } else { 0.0 });
         let distance_m = hits.distance_m.map(|d| if d < f64::INFINITY { d } else { 0.0 });
         let mut doubt = Doubt {

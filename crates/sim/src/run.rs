@@ -203,10 +203,9 @@ impl<'w> Run<'w> {
             }
             if self.apparatus.weighs_rays {
                 let factors = self.apparatus.ray_factors(&rays, &hits);
-                values
-                    .iter_mut()
-                    .zip(factors)
-                    .for_each(|(value, factor)| *value *= factor);
+                for lane in 0..LANES {
+                    values[lane] *= factors[lane];
+                }
             }
             for lane in 0..LANES {
                 total[lane] += sight.weight * values[lane];

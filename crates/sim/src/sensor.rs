@@ -121,7 +121,7 @@ pub(crate) fn power(x: f64, p: f64) -> f64 {
             f64::MIN_POSITIVE
         }),
     );
-    if x > 0.0 { value } else { 0.0 }
+    if x > 0.0 || p == 0.0 { value } else { 0.0 }
 }
 
 /// The binary logarithm of a normal positive number x = 2^k m, m between sqrt(1/2) and sqrt(2): k plus the series of
@@ -339,6 +339,7 @@ mod tests {
             }
         }
         assert_eq!(power(0.0, 1.5), 0.0);
+        assert_eq!(power(0.0, 0.0), 1.0);
         assert_eq!(power(1.0, 7.0), 1.0);
     }
 

@@ -158,6 +158,13 @@ impl Walls {
         self.normals[segment]
     }
 
+    /// The coordinates of [`Walls::normal`] of several segments, one list each.
+    #[inline]
+    pub(crate) fn normals<const N: usize>(&self, segments: [u32; N]) -> ([f64; N], [f64; N]) {
+        let normals = segments.map(|segment| self.normal(segment as usize));
+        (normals.map(|n| n.x), normals.map(|n| n.y))
+    }
+
     /// Which wall a segment is a piece of.
     #[inline]
     pub(crate) fn side(&self, segment: usize) -> Side {

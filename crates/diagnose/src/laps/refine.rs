@@ -10,7 +10,7 @@ use super::likeliest::{Likeliest, Rises};
 use super::likelihood::Fit;
 use super::parabola::{Column, Local, Nearest};
 use super::part::{Freedom, Part, Shape};
-use super::rounds::{ERRORS, best_of};
+use super::rounds::{ERRORS, NEAR, best_of};
 use super::screen::price;
 use super::simulated::Evaluated;
 use super::tests_of_fit::{Departures, HOPELESS_P, SIGNIFICANT_P};
@@ -207,6 +207,12 @@ impl Descent {
     pub(super) fn within_reach(&self) -> f64 {
         let progress = Some(self.progress).filter(|progress| progress.is_finite());
         self.score + (progress.unwrap_or(0.0) - ERRORS * self.score_error).max(0.0)
+    }
+
+    /// The log-likelihood by which it may be behind one whose score has such an error, and end near it.
+    pub(super) fn behind_by_chance(&self, error: f64) -> f64 {
+        const ERRORS_BEHIND: f64 = 2.5;
+        ERRORS_BEHIND * error.hypot(self.score_error)
     }
 
     /// Whether nothing short of another effect would help, as far as a round saw.
@@ -468,24 +474,22 @@ impl Trial<'_> {
 
     /// Judges those descents of a round together that are near the best of them: a scatter of its own has an error of its own.
     pub(super) fn judge_together(&self, descents: &mut [Descent]) {
-        /// Log-likelihood, and errors of it, by which a descent may be behind.
-        const NEAR: f64 = 50.0;
-        const ERRORS_BEHIND: f64 = 2.5;
         let Some(best) = best_of(descents) else { return };
-        let (best, error) = (best.score, best.score_error);
-        let is_near = |descent: &Descent| {
-            let may_be_chance = ERRORS_BEHIND * error.hypot(descent.score_error);
-            descent.judged.is_some() && descent.score > best - NEAR.max(may_be_chance)
+        let near = |(place, descent): (usize, &'_ Descent)| {
+            let is_near = descent.score > best.score - NEAR.max(descent.behind_by_chance(best.score_error));
+            (is_near && descent.judged.is_some()).then_some(place)
         };
-        let mut rivals: Vec<&mut Descent> = descents.iter_mut().filter(|descent| is_near(descent)).collect();
-        let judged: Vec<Judged> = rivals.iter().filter_map(|rival| rival.judged.clone()).collect();
-        let simulated: Vec<&Evaluated> = judged.iter().map(|judged| &judged.simulated).collect();
+        let near: Vec<usize> = descents.iter().enumerate().filter_map(near).collect();
+        let judged = near.iter().filter_map(|&place| descents[place].judged.as_ref());
+        let (simulated, hoped): (Vec<&Evaluated>, Vec<f64>) =
+            judged.map(|judged| (&judged.simulated, judged.hoped)).unzip();
         if simulated.len() < 2 {
             return;
         }
         let fits = self.fits_of_rivals(&simulated).unwrap_or_default();
-        for ((rival, fit), judged) in rivals.iter_mut().zip(fits).zip(&judged) {
-            let gain = self.hoped_gain(&rival.hypothesis, &fit, judged.hoped);
+        for ((place, fit), hoped) in near.into_iter().zip(fits).zip(hoped) {
+            let rival = &mut descents[place];
+            let gain = self.hoped_gain(&rival.hypothesis, &fit, hoped);
             let score = self.atlas.score_of(&rival.hypothesis, gain);
             rival.progress += score - rival.score;
             rival.score = score;

@@ -90,8 +90,8 @@ pub(super) const ROUNDS_OF_GROUPS: [Rung; 2] =
 pub(super) const ROUNDS_FROM_NEAR: [Rung; 2] =
     [rung(Round::Full, 30.0, 0.004), rung(Round::Full, 15.0, 0.004)];
 
-/// Log-likelihood within which an effect that jumps is worth a closer look at its size.
-const NEAR: f64 = 50.0;
+/// Log-likelihood within which descents are judged together, and an effect that jumps is worth a closer look at its size.
+pub(super) const NEAR: f64 = 50.0;
 
 /// Looks at sizes ever better beside others that follow, as many more where each still gains much, and log-likelihood by which one must
 /// change a descent for the next to matter.
@@ -121,8 +121,6 @@ impl Search<'_> {
     ) -> Vec<Descent> {
         /// Descents that go on where none seems to come to an end, or the others seem to lose.
         const FEW: usize = 3;
-        /// Errors of a difference by which one may be behind that ends near the best.
-        const ERRORS_BEHIND: f64 = 2.5;
         let mut alive: Vec<Descent> = hypotheses
             .map(|start| Descent::start(self.atlas(), start))
             .collect();
@@ -144,8 +142,7 @@ impl Search<'_> {
             let (hopeless, fits) = (is_hopeless(first), first.fits());
             let bar = best.max(reached);
             let behind = rung.allowed_behind(first.hypothesis.fitted(self.atlas()), bar, fits);
-            let may_be_chance = |d: &Descent| ERRORS_BEHIND * error.hypot(d.score_error);
-            alive.retain(|d| d.within_reach() >= bar - behind.max(may_be_chance(d)));
+            alive.retain(|d| d.within_reach() >= bar - behind.max(d.behind_by_chance(error)));
             alive = self.without_repeats(alive, |descent| &descent.hypothesis);
             if fits {
                 let others = alive.split_off(FEW.min(alive.len()));

@@ -24,16 +24,12 @@ impl RayHits<'_> {
     /// Cosine of the angle between each ray and the wall's normal, in [0, 1]; anything of a ray that met none.
     #[inline]
     pub fn cos_incidence(&self) -> [f64; LANES] {
-        let normals = self
-            .hits
-            .segment
-            .map(|segment| self.walls.normal(segment as usize));
+        let (normal_x, normal_y) = self.walls.normals(self.hits.segment);
         let Rays {
             direction_x,
             direction_y,
             ..
         } = self.rays;
-        let (normal_x, normal_y) = (normals.map(|n| n.x), normals.map(|n| n.y));
         let mut cos = [0.0; LANES];
         for i in 0..LANES {
             let towards = (normal_x[i] * direction_x[i] + normal_y[i] * direction_y[i]).abs();

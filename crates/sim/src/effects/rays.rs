@@ -96,32 +96,16 @@ pub(super) const INCIDENCE_FALLOFF: Spec = Spec {
 #[derive(Debug)]
 struct IncidenceFalloff;
 
-impl IncidenceFalloff {
-    #[inline(always)]
-    fn factor(exponent: f64, cos_incidence: f64) -> f64 {
-        const LEAST: f64 = f64::MIN_POSITIVE;
-        // 0^0 is 1 too: without falloff nothing changes.
-        power(
-            if cos_incidence > LEAST {
-                cos_incidence
-            } else {
-                LEAST
-            },
-            exponent,
-        )
-    }
-}
-
 impl Effect for IncidenceFalloff {
     fn hooks(&self) -> &'static [Hook] {
         &[Hook::RayFactors]
     }
     fn ray_factor(&self, values: &[f64], hit: &Hit) -> f64 {
-        Self::factor(values[0], hit.cos_incidence)
+        power(hit.cos_incidence, values[0])
     }
     fn ray_factors(&self, values: &[f64], hits: &RayHits<'_>, factors: &mut Readings) {
         let exponent = values[0];
-        let own = hits.cos_incidence().map(|cos| Self::factor(exponent, cos));
+        let own = hits.cos_incidence().map(|cos| power(cos, exponent));
         for lane in 0..LANES {
             factors[lane] *= own[lane];
         }
@@ -132,20 +116,22 @@ impl Effect for IncidenceFalloff {
 #[derive(Debug)]
 struct WallReflectance(Side);
 
+impl WallReflectance {
+    fn factor(&self, values: &[f64], side: Side) -> f64 {
+        if side == self.0 { values[0] } else { 1.0 }
+    }
+}
+
 impl Effect for WallReflectance {
     fn hooks(&self) -> &'static [Hook] {
         &[Hook::RayFactors]
     }
     fn ray_factor(&self, values: &[f64], hit: &Hit) -> f64 {
-        if hit.site.place.side == self.0 {
-            values[0]
-        } else {
-            1.0
-        }
+        self.factor(values, hit.site.place.side)
     }
     fn ray_factors(&self, values: &[f64], hits: &RayHits<'_>, factors: &mut Readings) {
         for lane in hits.lanes() {
-            factors[lane] *= if hits.side(lane) == self.0 { values[0] } else { 1.0 };
+            factors[lane] *= self.factor(values, hits.side(lane));
         }
     }
 }
