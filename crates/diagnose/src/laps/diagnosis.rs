@@ -217,6 +217,10 @@ fn explain(search: &Search<'_>, mut found: Vec<Found>) -> Vec<Found> {
         found = preferred(found, patterns);
     }
     if !first_is(&found, suffices) {
+        let opposite = search.on_wall_opposite(&found);
+        found = preferred(found, opposite);
+    }
+    if !first_is(&found, suffices) {
         let beside = search.scans_beside(&found);
         found = preferred(found, beside);
     }

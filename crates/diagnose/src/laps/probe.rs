@@ -174,6 +174,20 @@ impl Probe {
         self.spec == other.spec && sensor(self) != sensor(other)
     }
 
+    /// Whether it acts on the other wall, near the place where another one acts with such values: a robot between them comes as near to
+    /// one as it leaves the other.
+    pub(super) fn is_opposite(&self, other: &Self, values: &[f64]) -> bool {
+        /// Share of the walls' length.
+        const NEAR: f64 = 0.1;
+        let (Some([wall, at, _]), Some([facing, position, _])) =
+            (self.place(&self.origin), other.place(values))
+        else {
+            return false;
+        };
+        let apart = (at - position).rem_euclid(1.0);
+        wall != facing && apart.min(1.0 - apart) <= NEAR
+    }
+
     /// Brings its values to the place where another one acts with such values.
     pub(super) fn move_to_place_of(&self, own: &mut [f64], other: &Self, values: &[f64]) {
         let Some([wall, position, length_m]) = other.place(values) else {
@@ -471,6 +485,27 @@ mod tests {
         // Twenty-four places a wall, chosen before.
         is("wall-bump", 1, 0.008 / STEP);
         is("wall-bump", 0, 0.024);
+    }
+
+    #[test]
+    fn opposite_a_bump_near_the_walls_end_are_places_to_either_side_of_it() {
+        let probes = probes(0.032);
+        let named = |name: &str| probes.iter().find(|probe| probe.spec.name == name);
+        let bump = named("wall-bump").expect("the effect is tried");
+        let mut values = bump.values(-0.01);
+        let mut place = |name: &str, value: f64| values[bump.spec.place_of(name).expect("a place")] = value;
+        place("wall", 0.0);
+        place("position", 0.99);
+        let opposite: Vec<[f64; 3]> = (probes.iter())
+            .filter(|probe| probe.is_opposite(bump, &values))
+            .filter_map(|probe| probe.place(&probe.origin))
+            .collect();
+        assert!(opposite.iter().all(|place| place[0] == 1.0));
+        // Of 24 places a wall those within a tenth, for bumps and for patches.
+        let near = |place: &&[f64; 3]| !(0.09..0.89).contains(&place[1]);
+        assert_eq!(opposite.iter().filter(near).count(), opposite.len());
+        assert_eq!(opposite.len(), 2 * 5);
+        assert!(!bump.is_opposite(named("reading-gain").expect("the effect is tried"), &[1.0]));
     }
 
     #[test]

@@ -76,6 +76,17 @@ impl Atlas {
         probes.filter_map(|probe| self.screen_one(probe, &self.nodes(probe), Shape::Constant, residual))
     }
 
+    /// The same, best first.
+    pub(super) fn ranked_constant(
+        &self,
+        probes: impl Iterator<Item = usize>,
+        residual: &White,
+    ) -> Vec<Screened> {
+        let mut screened: Vec<Screened> = self.screen_constant(probes, residual).collect();
+        screened.sort_by(|a, b| b.score.total_cmp(&a.score));
+        screened
+    }
+
     /// Sizes and actions along a probe's path, the neutral size among them, in order of size.
     pub(super) fn nodes(&self, probe: usize) -> Vec<(f64, White)> {
         let p = &self.probes[probe];

@@ -178,6 +178,37 @@ impl Search<'_> {
         self.settle_near(self.descend(starts.iter(), &ROUNDS, f64::NEG_INFINITY))
     }
 
+    /// The first of some explanations with what acts on the wall opposite in place of a bump or a patch, tried to the end: one that
+    /// is longer than those that were simulated beforehand shows less by its path than another one across the track.
+    pub(super) fn on_wall_opposite(&self, found: &[Found]) -> Vec<Found> {
+        /// Places tried for each part.
+        const MOST: usize = 4;
+        let Some(best) = found.first() else {
+            return Vec::new();
+        };
+        let probes = &self.atlas().probes;
+        let mut starts: Vec<Hypothesis> = Vec::new();
+        for (i, part) in best.hypothesis.parts.iter().enumerate() {
+            let own = &probes[part.probe];
+            let is_opposite = |&probe: &usize| probes[probe].is_opposite(own, &part.values[0]);
+            let opposite: Vec<usize> = (0..probes.len()).filter(is_opposite).collect();
+            let rest = best.hypothesis.without(i);
+            if opposite.is_empty() {
+                continue;
+            }
+            let Some(left) = self.left_by(&rest) else {
+                continue;
+            };
+            let screened = self.atlas().ranked_constant(opposite.into_iter(), &left);
+            starts.extend(screened.iter().take(MOST).map(|s| rest.with(&s.hypothesis)));
+        }
+        if starts.is_empty() {
+            return Vec::new();
+        }
+        self.tell(format_args!("what is on the wall opposite"));
+        self.settle_near(self.descend(starts.iter(), &ROUNDS, f64::NEG_INFINITY))
+    }
+
     /// Explanations near the best with the same effects at the other sensors, tried to the end: of one effect two were so far.
     pub(super) fn at_other_sensors(&self, found: &[Found]) -> Vec<Found> {
         const NEAR: f64 = 8.0;
@@ -220,8 +251,7 @@ impl Search<'_> {
             return Vec::new();
         };
         let of_effect = (0..probes.len()).filter(|&probe| probes[probe].spec == own.spec);
-        let mut screened: Vec<Screened> = self.atlas().screen_constant(of_effect, &left).collect();
-        screened.sort_by(|a, b| b.score.total_cmp(&a.score));
+        let screened = self.atlas().ranked_constant(of_effect, &left);
         let Some(best) = screened.first() else {
             return Vec::new();
         };
