@@ -117,20 +117,20 @@ pub(super) struct Descent {
 /// What a descent's score was judged by.
 #[derive(Debug, Clone)]
 struct Judged {
+    /// The hypothesis before its numbers moved, if they did.
+    hypothesis: Hypothesis,
     simulated: Evaluated,
     /// Log-likelihood that its numbers were hoped to gain once they moved.
     hoped: f64,
-    /// Whether they did not move after all.
-    stays: bool,
 }
 
 impl Judged {
     /// By the hypothesis as it stays.
-    fn staying(simulated: Evaluated) -> Self {
+    fn staying(hypothesis: &Hypothesis, simulated: Evaluated) -> Self {
         Self {
+            hypothesis: hypothesis.clone(),
             simulated,
             hoped: 0.0,
-            stays: true,
         }
     }
 }
@@ -161,9 +161,11 @@ impl Seen {
     }
 }
 
+/// Log-likelihood by which simulations with the same draws must differ for one to be better.
+const BETTER: f64 = 1.0;
+
 /// Whether a gain in log-likelihood is no larger than one before, nor smaller beyond the errors of both.
 fn is_no_better((gain, error): (f64, f64), (before, error_before): (f64, f64)) -> bool {
-    const BETTER: f64 = 1.0;
     let gained = gain - before;
     gained < BETTER && -gained < ERRORS * error.hypot(error_before)
 }
@@ -283,7 +285,7 @@ impl Trial<'_> {
             progress: score - descent.score,
             remainder: Some(Departures::new(&fit.residual, &self.atlas.layout)),
             found,
-            judged: Some(Judged::staying(center)),
+            judged: Some(Judged::staying(&descent.hypothesis, center)),
             ..descent
         })
     }
@@ -328,9 +330,9 @@ impl Trial<'_> {
                 here = Some(seen);
             }
             judged = Some(Judged {
+                hypothesis: hypothesis.clone(),
                 simulated: center,
                 hoped: nearest.hoped,
-                stays: false,
             });
             (self.hoped_gain(hypothesis, &fit, nearest.hoped), fit.gain_error)
         };
@@ -396,7 +398,7 @@ impl Trial<'_> {
         let at_rest =
             found && (moves.iter().zip(&errors)).all(|(moved, error)| moved.abs() < AT_REST * error);
         let (hypothesis, moved) = if at_rest {
-            (descent.hypothesis, moved)
+            (descent.hypothesis.clone(), moved)
         } else {
             let hypothesis = self.atlas.with_moves(&descent.hypothesis, &freedoms, &moves);
             (hypothesis, moved + moves)
@@ -415,9 +417,9 @@ impl Trial<'_> {
             rests: false,
             found,
             judged: Some(Judged {
+                hypothesis: descent.hypothesis,
                 simulated: center,
                 hoped,
-                stays: at_rest,
             }),
             hypothesis,
             freedoms,
@@ -432,26 +434,35 @@ impl Trial<'_> {
         fit.fair_gain() + hoped.min(most.max(0.0))
     }
 
-    /// A hypothesis at its most likely sizes, simulated often enough to judge it; `None` where the robot crashes, and where
-    /// one of its effects came to nothing.
+    /// A hypothesis at its most likely sizes, simulated often enough to judge it, or as it was before a last move that promised more
+    /// than it kept; `None` where the robot crashes, and where one of its effects came to nothing.
     pub(super) fn settle(&self, found: &Descent) -> Option<Settled> {
         let hypothesis = self.atlas.quantised(found.hypothesis.clone());
-        if hypothesis
-            .parts
-            .iter()
-            .any(|part| part.is_nothing(&self.atlas.probes[part.probe]))
-        {
+        if !self.atlas.may_be_settled(&hypothesis) {
             return None;
         }
         let sets = self.atlas.enough(END_SETS, 1);
-        let end = match &found.judged {
-            Some(judged) if judged.stays && hypothesis == found.hypothesis => {
-                self.evaluate_more(&hypothesis, judged.simulated.clone(), sets)?
+        let (hypothesis, simulated) = match &found.judged {
+            Some(judged) if judged.hypothesis == hypothesis => (hypothesis, judged.simulated.clone()),
+            judged => {
+                let moved = self.evaluate(&hypothesis, sets)?;
+                match judged.as_ref().filter(|judged| self.was_better(judged, &moved)) {
+                    Some(judged) => (judged.hypothesis.clone(), judged.simulated.clone()),
+                    None => (hypothesis, moved),
+                }
             }
-            _ => self.evaluate(&hypothesis, sets)?,
         };
+        let end = self.evaluate_more(&hypothesis, simulated, sets)?;
         let fit = self.fit_with_error(&end)?;
         Some(self.atlas.settled(hypothesis, found.errors(), fit, end))
+    }
+
+    /// Whether a hypothesis that may be settled was better before its numbers moved.
+    fn was_better(&self, judged: &Judged, moved: &Evaluated) -> bool {
+        let gain = |simulated: &Evaluated| Some(self.fit(simulated)?.fair_gain());
+        let gains = gain(&judged.simulated).zip(gain(moved));
+        self.atlas.may_be_settled(&judged.hypothesis)
+            && gains.is_some_and(|(before, after)| before - after > BETTER)
     }
 
     /// Hypotheses that explain the data about as well simulated more often, and told apart by what they do to the mean:
@@ -506,6 +517,7 @@ impl Atlas {
             _ => here,
         };
         let score = self.score_of(&better.hypothesis, better.gain);
+        let judged = Some(Judged::staying(&better.hypothesis, better.simulated));
         Descent {
             score,
             score_error: better.error,
@@ -516,7 +528,7 @@ impl Atlas {
             found: true,
             near: None,
             seen: None,
-            judged: Some(Judged::staying(better.simulated)),
+            judged,
             ..descent
         }
     }
@@ -543,14 +555,20 @@ impl Atlas {
             rests: to.is_near && round != Round::Rough,
             found: full && to.is_near,
             judged: Some(Judged {
+                hypothesis: descent.hypothesis,
                 simulated: to.center,
                 hoped: to.hoped,
-                stays: false,
             }),
             errors: vec![to.error],
             hypothesis,
             freedoms,
         }
+    }
+
+    /// Whether each effect does something, at a size that there is.
+    fn may_be_settled(&self, hypothesis: &Hypothesis) -> bool {
+        let is_nothing = |part: &Part| part.is_nothing(&self.probes[part.probe]);
+        !hypothesis.parts.iter().any(is_nothing) && self.quantised(hypothesis.clone()) == *hypothesis
     }
 
     /// The least sum of squares that a hypothesis may be hoped to leave of data: what chance leaves in the luckiest case, and in
@@ -660,7 +678,42 @@ fn is_settled(moves: &DVector<f64>, covariance: &DMatrix<f64>, freedoms: &[Freed
 
 #[cfg(test)]
 mod tests {
+    use sim::{Setting, find};
+
     use super::*;
+    use crate::laps::atlas::Extent;
+    use crate::laps::probe::probes;
+    use crate::laps::testing::simulated;
+
+    #[test]
+    fn a_last_move_that_promised_more_than_it_kept_is_taken_back() {
+        let known = probes(0.032).into_iter();
+        let known = known.filter(|probe| probe.spec.name == "wheel-scale");
+        let atlas = Atlas::with_probes(&simulated, &[], true, known.collect(), &|| ()).unwrap();
+        let aside = |mm: f64| Hypothesis::of(Part::screened(&atlas, 0, Shape::Constant, &[mm]));
+        let truth = [Setting::constant(find("wheel-scale").unwrap(), [1.3])];
+        let data = atlas
+            .observed(&simulated(&truth, 1000, Extent::Whole).unwrap())
+            .unwrap();
+        let trial = Trial {
+            atlas: &atlas,
+            simulate: &simulated,
+            data: &data,
+            silent: &[],
+            spent: &atlas.spent,
+        };
+        let settled = |before_mm: f64, after_mm: f64| {
+            let before = aside(before_mm);
+            let judged = Judged::staying(&before, trial.evaluate(&before, END_SETS).unwrap());
+            let descent = Descent {
+                judged: Some(judged),
+                ..Descent::start(&atlas, &aside(after_mm))
+            };
+            trial.settle(&descent).unwrap().refined.hypothesis
+        };
+        assert_eq!(settled(1.3, 0.8), aside(1.3));
+        assert_eq!(settled(0.8, 1.3), aside(1.3));
+    }
 
     #[test]
     fn what_gains_nothing_within_noise_is_no_better() {
