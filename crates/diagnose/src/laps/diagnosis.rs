@@ -374,20 +374,14 @@ impl Atlas {
 
 #[cfg(test)]
 mod tests {
-    use sim::find;
-
     use super::*;
     use crate::laps::atlas::Extent;
-    use crate::laps::probe::probes;
-    use crate::laps::testing::simulated;
+    use crate::laps::testing::{aside, atlas, simulated};
 
     #[test]
     fn where_every_simulation_stops_nothing_is_explained() {
-        let mut known = probes(0.032);
-        known.retain(|probe| probe.spec.name == "wheel-scale");
-        let atlas = Atlas::with_probes(&simulated, &[], true, known, &|| ()).unwrap();
-        let aside = [Setting::constant(find("wheel-scale").unwrap(), [5.0])];
-        let runs = simulated(&aside, 1000, Extent::Whole).unwrap();
+        let atlas = atlas();
+        let runs = simulated(&aside(5.0), 1000, Extent::Whole).unwrap();
         let stopped: &Simulate<'_> = &|_, _, _| None;
         let diagnosis = atlas.diagnose(stopped, &runs, &[], &|_| ()).unwrap();
         assert_eq!(diagnosis.answer.verdict, Verdict::Unexplained);

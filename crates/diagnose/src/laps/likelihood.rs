@@ -222,19 +222,13 @@ fn shared_error(laps: &[usize]) -> (f64, Vec<f64>) {
 
 #[cfg(test)]
 mod tests {
-    use sim::{Setting, find};
-
     use super::*;
     use crate::laps::atlas::Extent;
-    use crate::laps::probe::probes;
-    use crate::laps::testing::simulated;
+    use crate::laps::testing::{aside, atlas, simulated};
 
     #[test]
     fn rivals_are_told_apart_by_their_means_and_not_by_how_their_scatters_are_off() {
-        let known = probes(0.032).into_iter();
-        let known = known.filter(|probe| probe.spec.name == "wheel-scale");
-        let atlas = Atlas::with_probes(&simulated, &[], true, known.collect(), &|| ()).unwrap();
-        let aside = |mm: f64| [Setting::constant(find("wheel-scale").unwrap(), [mm])];
+        let atlas = atlas();
         let runs = simulated(&aside(100.0), 1000, Extent::Whole).unwrap();
         let data = atlas.observed(&runs).unwrap();
         let trial = Trial {

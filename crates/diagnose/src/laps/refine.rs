@@ -244,11 +244,26 @@ impl Descent {
 }
 
 impl Trial<'_> {
-    /// One round towards the best sizes; `None` where the robot then crashes.
+    /// One round towards the best sizes; `None` where the robot then crashes, and does so a little aside of these sizes too: a crash
+    /// in one lap of hundreds does not speak against them.
+    pub(super) fn descend(&self, descent: Descent, round: Round) -> Option<Descent> {
+        /// Shares of a step.
+        const ASIDE: [f64; 2] = [0.1, -0.1];
+        let (hypothesis, first) = (descent.hypothesis.clone(), descent.freedoms.first().copied());
+        self.descend_from(descent, round).or_else(|| {
+            let freedom = first?;
+            ASIDE.into_iter().find_map(|share| {
+                let aside = hypothesis.moved(self.atlas, &[(freedom, share * freedom.step)]);
+                self.descend_from(Descent::start(self.atlas, &aside), round)
+            })
+        })
+    }
+
+    /// One round from where a descent is; `None` where the robot crashes.
     ///
     /// A round simulates the hypothesis at its sizes and a step to either side of each, with the same draws, takes the
     /// means for parabolas in each number, and goes to where these are nearest to the data.
-    pub(super) fn descend(&self, descent: Descent, round: Round) -> Option<Descent> {
+    fn descend_from(&self, descent: Descent, round: Round) -> Option<Descent> {
         if descent.found {
             return Some(Descent {
                 progress: 0.0,
@@ -445,10 +460,10 @@ impl Trial<'_> {
         let (hypothesis, simulated) = match &found.judged {
             Some(judged) if judged.hypothesis == hypothesis => (hypothesis, judged.simulated.clone()),
             judged => {
-                let moved = self.evaluate(&hypothesis, sets)?;
-                match judged.as_ref().filter(|judged| self.was_better(judged, &moved)) {
+                let moved = self.evaluate(&hypothesis, sets);
+                match (judged.as_ref()).filter(|judged| self.was_better(judged, moved.as_ref())) {
                     Some(judged) => (judged.hypothesis.clone(), judged.simulated.clone()),
-                    None => (hypothesis, moved),
+                    None => (hypothesis, moved?),
                 }
             }
         };
@@ -457,21 +472,22 @@ impl Trial<'_> {
         Some(self.atlas.settled(hypothesis, found.errors(), fit, end))
     }
 
-    /// Whether a hypothesis that may be settled was better before its numbers moved.
-    fn was_better(&self, judged: &Judged, moved: &Evaluated) -> bool {
+    /// Whether a hypothesis that may be settled was better before its numbers moved to where the robot may crash.
+    fn was_better(&self, judged: &Judged, moved: Option<&Evaluated>) -> bool {
         let gain = |simulated: &Evaluated| Some(self.fit(simulated)?.fair_gain());
-        let gains = gain(&judged.simulated).zip(gain(moved));
-        self.atlas.may_be_settled(&judged.hypothesis)
-            && gains.is_some_and(|(before, after)| before - after > BETTER)
+        let lost =
+            gain(&judged.simulated).map(|before| before - moved.and_then(gain).unwrap_or(f64::NEG_INFINITY));
+        self.atlas.may_be_settled(&judged.hypothesis) && lost.is_some_and(|lost| lost > BETTER)
     }
 
     /// Hypotheses that explain the data about as well simulated more often, and told apart by what they do to the mean:
     /// by the scatter only as far as theirs differ by more than chance.
     pub(super) fn settle_rivals(&self, rivals: Vec<Settled>, sets: u64) -> Vec<Settled> {
         let (refined, evaluated): (Vec<Refined>, Vec<Evaluated>) = (rivals.into_par_iter())
-            .filter_map(|Settled { refined, evaluated }| {
-                let more = self.evaluate_more(&refined.hypothesis, evaluated, sets)?;
-                Some((refined, more))
+            .map(|Settled { refined, evaluated }| {
+                // A lap in thousands may crash.
+                let more = self.evaluate_more(&refined.hypothesis, evaluated.clone(), sets);
+                (refined, more.unwrap_or(evaluated))
             })
             .unzip();
         let fits = self.fits_of_rivals(&evaluated.iter().collect::<Vec<_>>());
@@ -678,23 +694,18 @@ fn is_settled(moves: &DVector<f64>, covariance: &DMatrix<f64>, freedoms: &[Freed
 
 #[cfg(test)]
 mod tests {
-    use sim::{Setting, find};
+    use sim::Setting;
 
     use super::*;
     use crate::laps::atlas::Extent;
-    use crate::laps::probe::probes;
-    use crate::laps::testing::simulated;
+    use crate::laps::testing::{aside, atlas, simulated};
 
     #[test]
     fn a_last_move_that_promised_more_than_it_kept_is_taken_back() {
-        let known = probes(0.032).into_iter();
-        let known = known.filter(|probe| probe.spec.name == "wheel-scale");
-        let atlas = Atlas::with_probes(&simulated, &[], true, known.collect(), &|| ()).unwrap();
-        let aside = |mm: f64| Hypothesis::of(Part::screened(&atlas, 0, Shape::Constant, &[mm]));
-        let truth = [Setting::constant(find("wheel-scale").unwrap(), [1.3])];
-        let data = atlas
-            .observed(&simulated(&truth, 1000, Extent::Whole).unwrap())
-            .unwrap();
+        let atlas = atlas();
+        let runs = simulated(&aside(1.3), 1000, Extent::Whole).unwrap();
+        let data = atlas.observed(&runs).unwrap();
+        let at = |mm: f64| Hypothesis::of(Part::screened(&atlas, 0, Shape::Constant, &[mm]));
         let trial = Trial {
             atlas: &atlas,
             simulate: &simulated,
@@ -703,16 +714,52 @@ mod tests {
             spent: &atlas.spent,
         };
         let settled = |before_mm: f64, after_mm: f64| {
-            let before = aside(before_mm);
+            let before = at(before_mm);
             let judged = Judged::staying(&before, trial.evaluate(&before, END_SETS).unwrap());
             let descent = Descent {
                 judged: Some(judged),
-                ..Descent::start(&atlas, &aside(after_mm))
+                ..Descent::start(&atlas, &at(after_mm))
             };
             trial.settle(&descent).unwrap().refined.hypothesis
         };
-        assert_eq!(settled(1.3, 0.8), aside(1.3));
-        assert_eq!(settled(0.8, 1.3), aside(1.3));
+        assert_eq!(settled(1.3, 0.8), at(1.3));
+        assert_eq!(settled(0.8, 1.3), at(1.3));
+    }
+
+    #[test]
+    fn a_crash_now_and_then_does_not_speak_against_sizes() {
+        let atlas = atlas();
+        let runs = simulated(&aside(1.3), 1000, Extent::Whole).unwrap();
+        let data = atlas.observed(&runs).unwrap();
+        let at = |mm: f64| Hypothesis::of(Part::screened(&atlas, 0, Shape::Constant, &[mm]));
+        let sets = atlas.enough(END_SETS, 1);
+        // At one size at once, elsewhere in a later data set, and from a size on always.
+        let crashing = |effects: &[Setting], set: u64, extent: Extent| {
+            let crashes = |mm: f64| mm == 1.2 || mm > 1.5 || set >= sets;
+            let stops = (effects.iter())
+                .any(|effect| effect.values(0, 0).is_ok_and(|(values, _)| crashes(values[0])));
+            simulated(effects, set, extent).filter(|_| !stops)
+        };
+        let trial = Trial {
+            atlas: &atlas,
+            simulate: &crashing,
+            data: &data,
+            silent: &[],
+            spent: &atlas.spent,
+        };
+        let descended = |mm: f64| trial.descend(Descent::start(&atlas, &at(mm)), Round::Rough);
+        assert!(trial.evaluate(&at(1.2), 3).is_none());
+        assert!(descended(1.2).is_some() && descended(1.8).is_none());
+        let before = at(1.3);
+        let judged = Judged::staying(&before, trial.evaluate(&before, sets).unwrap());
+        let moved = Descent {
+            judged: Some(judged),
+            ..Descent::start(&atlas, &at(1.2))
+        };
+        let settled = trial.settle(&moved).unwrap();
+        assert_eq!(settled.refined.hypothesis, before);
+        let rivals = trial.settle_rivals(vec![settled], CLOSE_SETS);
+        assert_eq!(rivals[0].evaluated.summaries.len() as u64, sets);
     }
 
     #[test]

@@ -1,9 +1,10 @@
 //! A robot that is nothing but noise, for tests.
 
-use sim::{Pattern, Setting};
+use sim::{Pattern, Setting, find};
 
-use super::atlas::Extent;
+use super::atlas::{Atlas, Extent};
 use super::observed::{ObservedLap, ObservedRun};
+use super::probe::probes;
 
 const GATES: usize = 40;
 
@@ -45,4 +46,16 @@ pub(super) fn simulated(effects: &[Setting], set: u64, extent: Extent) -> Option
     };
     let runs = extent.runs(2) as u64;
     (aside_mm < 1000.0).then(|| (0..runs).map(run).collect())
+}
+
+/// An atlas of this robot that knows a wheel scale alone.
+pub(super) fn atlas() -> Atlas {
+    let mut known = probes(0.032);
+    known.retain(|probe| probe.spec.name == "wheel-scale");
+    Atlas::with_probes(&simulated, &[], true, known, &|| ()).expect("it drives its laps")
+}
+
+/// A wheel scale that puts laps aside by so many mm.
+pub(super) fn aside(mm: f64) -> [Setting; 1] {
+    [Setting::constant(find("wheel-scale").expect("an effect"), [mm])]
 }
