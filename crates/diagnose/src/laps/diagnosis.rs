@@ -54,13 +54,7 @@ impl Atlas {
         let residual = self.white(&data, &self.null);
         let numbers = Departures::new(&residual, &self.layout);
         let screened = self.screen(&residual);
-        let trial = Trial {
-            atlas: self,
-            simulate,
-            data: &data,
-            silent: &[],
-            spent: &self.spent,
-        };
+        let trial = Trial::new(self, simulate, &data);
         let search = Search {
             trial,
             residual: &residual,
@@ -357,13 +351,7 @@ impl Atlas {
         if effects.is_empty() {
             return Ok((before, Some(before)));
         }
-        let trial = Trial {
-            atlas: self,
-            simulate,
-            data: &data,
-            silent: &[],
-            spent: &self.spent,
-        };
+        let trial = Trial::new(self, simulate, &data);
         let after = trial.remainder(effects);
         Ok((
             before,

@@ -132,13 +132,7 @@ mod tests {
 
     /// The declared model itself on trial.
     fn trial<'a>(atlas: &'a Atlas, simulate: &'a Simulate<'a>) -> Trial<'a> {
-        Trial {
-            atlas,
-            simulate,
-            data: &atlas.null,
-            silent: &[],
-            spent: &atlas.spent,
-        }
+        Trial::new(atlas, simulate, &atlas.null)
     }
 
     #[test]

@@ -87,7 +87,7 @@ impl Trial<'_> {
         }
         let more = |moved: f64, evaluated: &Evaluated| {
             let there = hypothesis.moved(self.atlas, &[(*freedom, moved)]);
-            self.evaluate_more(&there, evaluated.clone(), sets)
+            self.evaluate_more(&there, evaluated, sets)
         };
         let simulated = more(0.0, &local.center)?;
         let center = self.fit_with_error(&simulated)?;

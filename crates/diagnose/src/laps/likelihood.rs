@@ -231,13 +231,7 @@ mod tests {
         let atlas = atlas();
         let runs = simulated(&aside(100.0), 1000, Extent::Whole).unwrap();
         let data = atlas.observed(&runs).unwrap();
-        let trial = Trial {
-            atlas: &atlas,
-            simulate: &simulated,
-            data: &data,
-            silent: &[],
-            spent: &atlas.spent,
-        };
+        let trial = Trial::new(&atlas, &simulated, &data);
         // These two are simulated with different draws.
         let [one, other] =
             [99.9, 100.1].map(|mm| atlas.simulated(&simulated, &aside(mm), 32, &atlas.spent).unwrap());

@@ -3,7 +3,7 @@
 use sim::{Pattern, Setting, Spec, find};
 
 use super::groups::groups;
-use crate::candidate::round;
+use crate::candidate::{apart, round};
 
 /// One way in which one effect may act: a line through its parameters, from the neutral values outwards.
 #[derive(Debug, Clone)]
@@ -184,8 +184,8 @@ impl Probe {
         else {
             return false;
         };
-        let apart = (at - position).rem_euclid(1.0);
-        wall != facing && apart.min(1.0 - apart) <= NEAR
+        let along = self.spec.params.iter().find(|param| param.name == "position");
+        wall != facing && apart(at, position, along).abs() <= NEAR
     }
 
     /// Brings its values to the place where another one acts with such values.

@@ -322,7 +322,7 @@ impl Trial<'_> {
             local.center.clone()
         } else {
             let sets = self.atlas.enough(round.sets(), 1);
-            self.evaluate_more(hypothesis, local.center.clone(), sets)?
+            self.evaluate_more(hypothesis, &local.center, sets)?
         };
         let nearest = self.nearest(&center, &local.scatter, &local.columns, freedoms);
         let (mut here, mut judged) = (None, None);
@@ -467,7 +467,7 @@ impl Trial<'_> {
                 }
             }
         };
-        let end = self.evaluate_more(&hypothesis, simulated, sets)?;
+        let end = self.evaluate_more(&hypothesis, &simulated, sets)?;
         let fit = self.fit_with_error(&end)?;
         Some(self.atlas.settled(hypothesis, found.errors(), fit, end))
     }
@@ -486,7 +486,7 @@ impl Trial<'_> {
         let (refined, evaluated): (Vec<Refined>, Vec<Evaluated>) = (rivals.into_par_iter())
             .map(|Settled { refined, evaluated }| {
                 // A lap in thousands may crash.
-                let more = self.evaluate_more(&refined.hypothesis, evaluated.clone(), sets);
+                let more = self.evaluate_more(&refined.hypothesis, &evaluated, sets);
                 (refined, more.unwrap_or(evaluated))
             })
             .unzip();
@@ -706,13 +706,7 @@ mod tests {
         let runs = simulated(&aside(1.3), 1000, Extent::Whole).unwrap();
         let data = atlas.observed(&runs).unwrap();
         let at = |mm: f64| Hypothesis::of(Part::screened(&atlas, 0, Shape::Constant, &[mm]));
-        let trial = Trial {
-            atlas: &atlas,
-            simulate: &simulated,
-            data: &data,
-            silent: &[],
-            spent: &atlas.spent,
-        };
+        let trial = Trial::new(&atlas, &simulated, &data);
         let settled = |before_mm: f64, after_mm: f64| {
             let before = at(before_mm);
             let judged = Judged::staying(&before, trial.evaluate(&before, END_SETS).unwrap());
@@ -740,13 +734,7 @@ mod tests {
                 .any(|effect| effect.values(0, 0).is_ok_and(|(values, _)| crashes(values[0])));
             simulated(effects, set, extent).filter(|_| !stops)
         };
-        let trial = Trial {
-            atlas: &atlas,
-            simulate: &crashing,
-            data: &data,
-            silent: &[],
-            spent: &atlas.spent,
-        };
+        let trial = Trial::new(&atlas, &crashing, &data);
         let descended = |mm: f64| trial.descend(Descent::start(&atlas, &at(mm)), Round::Rough);
         assert!(trial.evaluate(&at(1.2), 3).is_none());
         assert!(descended(1.2).is_some() && descended(1.8).is_none());

@@ -192,20 +192,17 @@ impl Search<'_> {
             let own = &probes[part.probe];
             let is_opposite = |&probe: &usize| probes[probe].is_opposite(own, &part.values[0]);
             let opposite: Vec<usize> = (0..probes.len()).filter(is_opposite).collect();
-            let rest = best.hypothesis.without(i);
             if opposite.is_empty() {
                 continue;
             }
+            self.tell(format_args!("what is on the wall opposite"));
+            let rest = best.hypothesis.without(i);
             let Some(left) = self.left_by(&rest) else {
                 continue;
             };
             let screened = self.atlas().ranked_constant(opposite.into_iter(), &left);
             starts.extend(screened.iter().take(MOST).map(|s| rest.with(&s.hypothesis)));
         }
-        if starts.is_empty() {
-            return Vec::new();
-        }
-        self.tell(format_args!("what is on the wall opposite"));
         self.settle_near(self.descend(starts.iter(), &ROUNDS, f64::NEG_INFINITY))
     }
 

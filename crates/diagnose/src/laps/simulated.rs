@@ -153,12 +153,15 @@ impl Trial<'_> {
     pub(super) fn evaluate_more(
         &self,
         hypothesis: &Hypothesis,
-        evaluated: Evaluated,
+        evaluated: &Evaluated,
         sets: u64,
     ) -> Option<Evaluated> {
-        let mut summaries = evaluated.summaries;
-        let done = summaries.len() as u64;
-        summaries.extend(self.summaries(&hypothesis.settings(self.atlas), done..sets.max(done))?);
+        let done = evaluated.summaries.len() as u64;
+        if done >= sets {
+            return Some(evaluated.clone());
+        }
+        let mut summaries = evaluated.summaries.clone();
+        summaries.extend(self.summaries(&hypothesis.settings(self.atlas), done..sets)?);
         Some(self.atlas.paired(summaries, 0, evaluated.doubt.alike))
     }
 

@@ -16,3 +16,16 @@ pub(super) struct Trial<'a> {
     /// Where simulated data sets are counted.
     pub(super) spent: &'a Spent,
 }
+
+impl<'a> Trial<'a> {
+    /// A data set of which every entry has a say, counted with what the atlas was asked for.
+    pub(super) fn new(atlas: &'a Atlas, simulate: &'a Simulate<'a>, data: &'a Expectation) -> Self {
+        Self {
+            atlas,
+            simulate,
+            data,
+            silent: &[],
+            spent: &atlas.spent,
+        }
+    }
+}
