@@ -16,6 +16,7 @@ use super::layout::Layout;
 use super::observed::ObservedRun;
 use super::probe::{Probe, probes};
 use super::ripple::{Power, Ripples, power, wheel_sets};
+use super::spread::{Axes, PAIRED, Spread, Variances};
 use super::summary::{BLOCKS, Summary};
 use crate::Error;
 
@@ -73,8 +74,12 @@ pub struct Atlas {
     pub(super) samples: Vec<Expectation>,
     pub(super) layout: Layout,
     pub(super) probes: Vec<Probe>,
-    /// For each probe, for each of its sizes, the expectation in white; `None` where the robot crashes.
-    pub(super) paths: Vec<Vec<Option<White>>>,
+    /// For each probe, for each of its sizes, what it does; `None` where the robot crashes.
+    pub(super) paths: Vec<Vec<Option<Departure>>>,
+    /// Of each recording.
+    pub(super) axes: Vec<Axes>,
+    /// How laps of the declared model scatter in its first data sets.
+    pub(super) variances: Vec<Variances>,
     /// How laps of the declared model ripple.
     pub(super) ripples: Ripples,
     /// What screens asked for.
@@ -82,6 +87,27 @@ pub struct Atlas {
     /// Laps that were simulated to make it.
     made: u64,
     pub(super) spent: Spent,
+}
+
+/// What a size of a probe does to the declared model.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(super) struct Departure {
+    /// To its expectation.
+    pub(super) action: White,
+    /// To how its laps scatter.
+    pub(super) spread: Spread,
+}
+
+impl Departure {
+    /// The same of several recordings as one.
+    fn join(parts: &[&Self]) -> Self {
+        let numbers = parts.iter().flat_map(|part| part.action.iter().copied());
+        let length = parts.iter().map(|part| part.action.len()).sum();
+        Self {
+            action: White::from_iterator(length, numbers),
+            spread: Spread::join(parts.iter().map(|part| &part.spread)),
+        }
+    }
 }
 
 /// A count of the laps that a diagnosis asked for.
@@ -107,7 +133,7 @@ impl Clone for Spent {
 impl Atlas {
     /// Changes whenever the numbers of an atlas of the same model mean something else: atlases of another recipe are not to be
     /// read.
-    pub const RECIPE: u32 = 12;
+    pub const RECIPE: u32 = 13;
 
     /// Simulates everything for one recording; `cuts` simulate the declared model with walls that another program may have
     /// cut, which is no departure from it; `alike` says whether the declared model does the same in every run, whose physics steps
@@ -181,6 +207,8 @@ impl Atlas {
             layout,
             null: expectation,
             alike,
+            axes: vec![Axes::of(&scatter)],
+            variances: Vec::new(),
             scatter: vec![scatter],
             probes,
             paths: Vec::new(),
@@ -189,6 +217,8 @@ impl Atlas {
             made: 0,
             spent: Spent::default(),
         };
+        let paired = null[..PAIRED].iter().map(std::slice::from_ref);
+        atlas.variances = paired.map(|set| Variances::of(&atlas.axes, set)).collect();
         drop(null);
         atlas.paths = atlas.simulate_paths(&ticking, tick);
         atlas.ripples = atlas.ripples(&ticking, &Hypothesis::nothing(), round);
@@ -197,12 +227,16 @@ impl Atlas {
         Ok(atlas)
     }
 
-    /// The action of every probe at every size; `tick` is called for each data set that need not be simulated.
-    fn simulate_paths(&self, simulate: &Simulate<'_>, tick: &(dyn Fn() + Sync)) -> Vec<Vec<Option<White>>> {
+    /// What every probe does at every size; `tick` is called for each data set that need not be simulated.
+    fn simulate_paths(
+        &self,
+        simulate: &Simulate<'_>,
+        tick: &(dyn Fn() + Sync),
+    ) -> Vec<Vec<Option<Departure>>> {
         let jobs: Vec<(usize, usize)> = (self.probes.iter().enumerate())
             .flat_map(|(p, probe)| (0..probe.sizes.len()).map(move |k| (p, k)))
             .collect();
-        let points: Vec<Option<White>> = jobs
+        let points: Vec<Option<Departure>> = jobs
             .par_iter()
             .map(|&(p, k)| {
                 let probe = &self.probes[p];
@@ -210,7 +244,10 @@ impl Atlas {
                 let found =
                     self.simulated_until(simulate, &setting, 0..PATH_SETS, PATH_ERROR, &self.spent)?;
                 (found.summaries.len() as u64..PATH_SETS).for_each(|_| tick());
-                Some(self.white(&found.expectation, &self.null))
+                Some(Departure {
+                    action: self.white(&found.expectation, &self.null),
+                    spread: Spread::of(&self.axes, &found.summaries, &self.variances),
+                })
             })
             .collect();
         let mut points = points.into_iter();
@@ -230,7 +267,11 @@ impl Atlas {
             .collect();
         let paths =
             (0..probes.len()).map(|p| (0..probes[p].sizes.len()).map(|k| joined(&parts, p, k)).collect());
+        let variances =
+            (0..PAIRED).map(|set| Variances::join(parts.iter().map(|part| part.variances[set].clone())));
         Some(Self {
+            axes: parts.iter().flat_map(|part| part.axes.clone()).collect(),
+            variances: variances.collect(),
             null: Expectation::join(parts.iter().map(|part| part.null.clone())),
             alike: parts.iter().all(|part| part.alike),
             scatter: parts.iter().flat_map(|part| part.scatter.clone()).collect(),
@@ -260,6 +301,7 @@ impl Atlas {
             samples: self.samples.clone(),
             layout: self.layout.clone(),
             paths: self.paths.clone(),
+            variances: self.variances.clone(),
             ripples: self.ripples.clone(),
             made: self.made,
             kept: self.kept.to_map(),
@@ -277,6 +319,7 @@ impl Atlas {
             samples,
             layout,
             paths,
+            variances,
             ripples,
             made,
             kept,
@@ -286,7 +329,8 @@ impl Atlas {
         } else {
             probes(physics_step_s)
         };
-        (made_with == fingerprint(&probes)).then_some(Self {
+        (made_with == fingerprint(&probes)).then(|| Self {
+            axes: scatter.iter().map(Axes::of).collect(),
             null,
             alike,
             scatter,
@@ -294,6 +338,7 @@ impl Atlas {
             layout,
             probes,
             paths,
+            variances,
             ripples,
             kept: Kept::of(kept),
             made,
@@ -381,16 +426,10 @@ impl Atlas {
     }
 }
 
-/// The action of a probe's size on all recordings.
-fn joined(parts: &[Atlas], probe: usize, size: usize) -> Option<White> {
-    let pieces: Vec<&White> = (parts.iter())
-        .map(|part| part.paths[probe][size].as_ref())
-        .collect::<Option<_>>()?;
-    let length = pieces.iter().map(|piece| piece.len()).sum();
-    Some(White::from_iterator(
-        length,
-        pieces.iter().flat_map(|piece| piece.iter().copied()),
-    ))
+/// What a probe's size does to all recordings.
+fn joined(parts: &[Atlas], probe: usize, size: usize) -> Option<Departure> {
+    let parts = parts.iter().map(|part| part.paths[probe][size].as_ref());
+    Some(Departure::join(&parts.collect::<Option<Vec<_>>>()?))
 }
 
 /// How other cuts of the walls change the mean lap, by the same draws; a cut with which the robot crashes is left out.
@@ -419,7 +458,8 @@ struct Stored {
     scatter: Vec<Scatter>,
     samples: Vec<Expectation>,
     layout: Layout,
-    paths: Vec<Vec<Option<White>>>,
+    paths: Vec<Vec<Option<Departure>>>,
+    variances: Vec<Variances>,
     ripples: Ripples,
     made: u64,
     kept: BTreeMap<String, Action>,

@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector};
 use super::atlas::{Atlas, White};
 use super::expectation::Scatter;
 use super::observed::ObservedRun;
-use super::screen::nearest;
+use super::path::Path;
 use super::summary::BLOCKS;
 use crate::Error;
 
@@ -54,10 +54,10 @@ impl Atlas {
         };
         let target = seen(residual);
         let distance = |probe: usize| {
-            let nodes: Vec<(f64, White)> = (self.nodes(probe).iter())
-                .map(|(size, white)| (*size, seen(white)))
-                .collect();
-            nearest(&nodes, &target, 0..target.len()).map(|(_, at)| (&target - at).norm())
+            let nodes = self.nodes(probe).into_iter();
+            let path = Path::of(nodes.map(|(size, white)| (size, seen(&white))));
+            let nearest = path.likeliest(&target, 0..target.len())?;
+            Some((&target - nearest.action).norm())
         };
         let mut ranked: Vec<(f64, &'static str)> = (0..self.probes.len())
             .filter_map(|probe| Some((distance(probe)?, self.probes[probe].spec.name)))

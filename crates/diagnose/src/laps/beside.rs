@@ -10,6 +10,7 @@ use super::expectation::{Expectation, Scatter};
 use super::hypothesis::Hypothesis;
 use super::parabola::groups;
 use super::part::{Freedom, Part};
+use super::path::Node;
 use super::screen::{Screened, without_directions};
 use super::search::{Search, WEAK};
 use super::simulated::Draws;
@@ -19,9 +20,11 @@ use super::trial::Trial;
 #[derive(Debug, Clone)]
 pub(super) struct Base {
     pub(super) hypothesis: Hypothesis,
-    /// How the base's recordings scatter, from which what is sought has to stand out, if it explains nearly all. A noise that
-    /// does not is too large, because it stands for what is sought too: the declared model's scatter is the better guess.
+    /// How the base's recordings scatter, from which what is sought has to stand out, if it explains nearly all: as well as many data
+    /// sets tell it.
     scatter: Option<Vec<Scatter>>,
+    /// How much more it scatters than in these units, as logarithms of variances of a turned data set's entries.
+    widened: Option<White>,
     /// What its numbers do, as orthonormal directions in units of its scatter: they follow the other effect. None if they stay.
     following: Vec<White>,
 }
@@ -29,9 +32,13 @@ pub(super) struct Base {
 impl Base {
     /// The same in units of another scatter, if there is one.
     pub(super) fn in_units_of(self, scatter: Option<Vec<Scatter>>) -> Self {
-        Self {
-            scatter: scatter.or(self.scatter),
-            ..self
+        match scatter {
+            Some(_) => Self {
+                scatter,
+                widened: None,
+                ..self
+            },
+            None => self,
         }
     }
 
@@ -46,6 +53,7 @@ impl Trial<'_> {
     pub(super) fn following(&self, hypothesis: Hypothesis) -> Base {
         Base {
             scatter: None,
+            widened: None,
             following: self.directions(&hypothesis, &self.atlas.scatter),
             hypothesis,
         }
@@ -55,18 +63,21 @@ impl Trial<'_> {
     pub(super) fn base(&self, hypothesis: Hypothesis) -> Base {
         const SETS: u64 = 10;
         const NEARLY_ALL: f64 = 0.95;
-        let scatter = (self.evaluate(&hypothesis, SETS)).and_then(|evaluated| {
+        let evaluated = self.evaluate(&hypothesis, SETS);
+        let scatter = evaluated.as_ref().and_then(|evaluated| {
             let own = self.atlas.scatter_of(evaluated.summaries.iter(), 1)?;
             let square = |from: &Expectation| white(&own, &self.atlas.layout, self.data, from).norm_squared();
             let excess = |from: &Expectation| square(from) - self.atlas.layout.len() as f64;
             let left = excess(&evaluated.expectation);
             (left < (1.0 - NEARLY_ALL) * excess(&self.atlas.null)).then_some(own)
         });
+        let wider = evaluated.filter(|_| scatter.is_none());
         let units = scatter.as_ref().unwrap_or(&self.atlas.scatter);
         Base {
             following: self.directions(&hypothesis, units),
             hypothesis,
             scatter,
+            widened: wider.map(|evaluated| self.atlas.widened(&evaluated.summaries)),
         }
     }
 
@@ -133,6 +144,7 @@ impl Atlas {
         Base {
             hypothesis,
             scatter: None,
+            widened: None,
             following: Vec::new(),
         }
     }
@@ -141,7 +153,7 @@ impl Atlas {
     /// follow, best first. What is left is given in units of the declared model's scatter.
     fn screen_beside(&self, base: &Base, left: &White) -> Vec<Screened> {
         let beyond = |white: &White| self.beyond(base, white);
-        self.screen_by(&beyond(left), beyond)
+        self.screen_by(&beyond(left), beyond, base.widened.as_ref())
     }
 
     /// A vector in units of the declared model's scatter in those of a base's, but for what the base's numbers can follow.
@@ -223,7 +235,7 @@ impl Search<'_> {
                 let constant = screened.iter().find(constant);
                 let best = constant.and_then(|constant| {
                     let with = left(&constant.hypothesis.settings(self.atlas()))?;
-                    let (multiple, gain) = explains(&difference(&left_by_base, &with), &left_by_base, false);
+                    let (multiple, gain) = self.gain_beside(base, constant, &left_by_base, &with);
                     let score = self.atlas().score_of_constant(probe, gain);
                     Some((multiple, score - constant.score))
                 });
@@ -242,6 +254,37 @@ impl Search<'_> {
         let mut all: Vec<Screened> = screened.into_iter().filter_map(corrected).collect();
         all.sort_by(|a, b| b.score.total_cmp(&a.score));
         all
+    }
+
+    /// The multiple of a constant effect beside a base that explains most of what that leaves, and what it gains, by what is left
+    /// without it and with it, each by two groups of data sets; it scatters as its path says.
+    fn gain_beside(
+        &self,
+        base: &Base,
+        constant: &Screened,
+        without: &[White; 2],
+        with: &[White; 2],
+    ) -> (f64, f64) {
+        let atlas = self.atlas();
+        let probe = constant.probe();
+        let path = atlas.path(probe, &atlas.nodes(probe), base.widened.as_ref());
+        let [before, after] = [
+            atlas.probes[probe].neutral,
+            constant.hypothesis.parts[0].mean_size(atlas),
+        ]
+        .map(|size| path.at(size));
+        let in_units_of = |node: &Node, left: &[White; 2]| {
+            let deviations = node.widened.map(|widened| (-0.5 * widened).exp());
+            left.each_ref()
+                .map(|left| atlas.turned(left).component_mul(&deviations))
+        };
+        let deviance = |node: &Node| {
+            let [one, other] = in_units_of(node, without);
+            one.dot(&other) + node.widened.sum()
+        };
+        let left = in_units_of(&after, without);
+        let (multiple, gain) = explains(&difference(&left, &in_units_of(&after, with)), &left, false);
+        (multiple, gain + 0.5 * (deviance(&before) - deviance(&after)))
     }
 
     /// Effects with those that explain best what each of them leaves, but for those pairs that were tried: actions do not quite add up,

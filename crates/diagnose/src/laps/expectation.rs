@@ -172,7 +172,7 @@ impl Scatter {
     ) -> Option<Self> {
         let size = recordings.clone().next()?.scatter.nrows();
         let (lap, freedom) = pooled(recordings, size);
-        let axes = axes(&lap);
+        let axes = principal_axes(&lap);
         Self::with(lap, freedom, second.cholesky()?, DMatrix::zeros(size, size), axes)
     }
 
@@ -315,12 +315,12 @@ impl Scatter {
 
     /// The mean lap of [`Scatter::whiten_mean`].
     pub(super) fn unwhiten_mean(&self, white: &DVector<f64>) -> DVector<f64> {
-        self.mean.l() * white
+        self.root_of_mean() * white
     }
 
     /// The vector of [`Scatter::whiten`].
     pub(super) fn unwhiten(&self, white: &DVector<f64>) -> DVector<f64> {
-        self.lap.l() * white
+        self.root_of_lap() * white
     }
 
     /// The numbers of [`Scatter::whiten_second`].
@@ -333,10 +333,25 @@ impl Scatter {
         2.0 * self.second.l_dirty().diagonal().map(f64::ln).sum()
     }
 
+    /// What the declaration leaves open, as a covariance of a run's mean lap times the number of laps.
+    pub(super) fn open(&self) -> &DMatrix<f64> {
+        &self.open
+    }
+
+    /// The lower root of the covariance by which [`Scatter::whiten_mean`] whitens.
+    pub(super) fn root_of_mean(&self) -> DMatrix<f64> {
+        self.mean.l()
+    }
+
+    /// The lower root of the covariance by which [`Scatter::whiten`] does.
+    pub(super) fn root_of_lap(&self) -> DMatrix<f64> {
+        self.lap.l()
+    }
+
     /// The covariance of one lap.
     pub(super) fn of_lap(&self) -> DMatrix<f64> {
-        let l = self.lap.l();
-        &l * l.transpose()
+        let root = self.root_of_lap();
+        &root * root.transpose()
     }
 
     /// The mean square of how laps of some recordings deviate from their runs, in units of one lap's covariance.
@@ -364,7 +379,10 @@ fn whiten(covariance: &Cholesky<f64, Dyn>, vector: &DVector<f64>) -> DVector<f64
 }
 
 /// The covariance of one lap within the runs of some recordings, and its degrees of freedom.
-fn pooled<'a>(recordings: impl Iterator<Item = &'a Recording>, size: usize) -> (DMatrix<f64>, f64) {
+pub(super) fn pooled<'a>(
+    recordings: impl Iterator<Item = &'a Recording>,
+    size: usize,
+) -> (DMatrix<f64>, f64) {
     let (mut lap, mut freedom) = (DMatrix::zeros(size, size), 0);
     for recording in recordings {
         lap += &recording.scatter;
@@ -428,7 +446,7 @@ fn variances_of_second(recordings: &[&Recording], copies: usize) -> DVector<f64>
 }
 
 /// The principal axes of a covariance, the longest first.
-fn axes(covariance: &DMatrix<f64>) -> DMatrix<f64> {
+pub(super) fn principal_axes(covariance: &DMatrix<f64>) -> DMatrix<f64> {
     let found = SymmetricEigen::new(covariance.clone());
     let mut order: Vec<usize> = (0..covariance.nrows()).collect();
     order.sort_by(|&a, &b| found.eigenvalues[b].total_cmp(&found.eigenvalues[a]));
@@ -436,7 +454,7 @@ fn axes(covariance: &DMatrix<f64>) -> DMatrix<f64> {
 }
 
 /// Ratios of variances along neighbouring axes: each becomes the geometric mean of those about it.
-fn smoothed(ratios: &DVector<f64>) -> DVector<f64> {
+pub(super) fn smoothed(ratios: &DVector<f64>) -> DVector<f64> {
     const ABOUT: usize = 3;
     let logarithms = ratios.map(f64::ln);
     DVector::from_fn(ratios.len(), |i, _| {
@@ -531,7 +549,7 @@ mod tests {
     /// A well known scatter of these laps.
     fn known(smooth: f64) -> Scatter {
         let lap = covariance(smooth);
-        let axes = axes(&lap);
+        let axes = principal_axes(&lap);
         let second = DMatrix::identity(SECOND, SECOND).cholesky().unwrap();
         Scatter::with(lap, 1e4, second, DMatrix::zeros(SIZE, SIZE), axes).unwrap()
     }

@@ -6,7 +6,8 @@ use sim::Setting;
 
 use super::atlas::Atlas;
 use super::part::{Freedom, Part, Shape};
-use super::screen::{at, worth};
+use super::path::at;
+use super::screen::worth;
 use super::tests_of_fit::Quadratic;
 use crate::candidate::{apart, bounded, round, take_mean_of_others};
 

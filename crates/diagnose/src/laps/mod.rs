@@ -19,8 +19,10 @@ mod kept;
 mod likelihood;
 mod memo;
 mod part;
+mod path;
 mod probe;
 mod simulated;
+mod spread;
 mod trial;
 
 // Which effects could explain the data.
@@ -33,6 +35,7 @@ mod scans;
 mod screen;
 mod second;
 mod steadiness;
+mod together;
 
 // Their most likely sizes, and how well these are known.
 mod hunt;

@@ -6,13 +6,12 @@ use rayon::prelude::*;
 use super::atlas::Atlas;
 use super::hunt::Hunt;
 use super::hypothesis::Hypothesis;
-use super::part::{Part, Shape};
-use super::pieces::ScreenedPair;
+use super::part::Part;
+use super::path::tangent;
 use super::refine::Descent;
 use super::rounds::{ERRORS, ROUNDS_OF_SEVERAL, Rung, best_of};
-use super::screen::tangent;
 use super::search::{BASES, Found, NEARLY_ALL, STRONG, Search, of_other_effects};
-use super::simulated::Draws;
+use super::together::ScreenedPair;
 
 /// Hypotheses of several effects that were descended from, and where that led.
 pub(super) struct Tried {
@@ -153,7 +152,7 @@ impl Search<'_> {
     /// Pairs that together explain most as far as actions add up, as simulations where they were screened rank them; simulated
     /// once.
     fn together(&self) -> &[ScreenedPair] {
-        const HEARD: usize = 48;
+        const HEARD: usize = 96;
         self.together.get_or_init(|| {
             self.tell(format_args!("which two effects go together"));
             self.heard_pairs(self.atlas().screen_pairs(self.residual, HEARD))
@@ -261,25 +260,21 @@ impl Search<'_> {
         const SETS: u64 = 4;
         let atlas = self.atlas();
         let probes = [0, 1].map(|i| pair.hypothesis.parts[i].probe);
-        let nothing = atlas.at_rest(Hypothesis::nothing());
-        let settings = pair.hypothesis.settings(atlas);
-        let left = self
-            .trial
-            .left_beside(&nothing, &settings, &Draws::Sets(0..SETS))?;
-        let [a, b] = [0, 1].map(|i| tangent(&atlas.nodes(probes[i]), pair.sizes[i]));
-        let squares = Matrix2::new(a.norm_squared(), a.dot(&b), a.dot(&b), b.norm_squared());
+        let (left, scatter) = self.trial.heard(&pair.hypothesis, SETS)?;
+        let weights = scatter.weights();
+        let moves = [0, 1].map(|i| atlas.turned(&tangent(&atlas.nodes(probes[i]), pair.sizes[i])));
+        let [a, b] = [0, 1].map(|i| moves[i].component_mul(&weights));
+        let squares = Matrix2::new(
+            a.dot(&moves[0]),
+            a.dot(&moves[1]),
+            a.dot(&moves[1]),
+            b.dot(&moves[1]),
+        );
         let products = Vector2::new(a.dot(&left), b.dot(&left));
         let step = squares.try_inverse()? * products;
         let sizes = [0, 1].map(|i| pair.sizes[i] + step[i]);
-        let part = |i: usize| Part::screened(atlas, probes[i], Shape::Constant, &[sizes[i]]);
-        let gain = 0.5 * (self.residual.norm_squared() - left.norm_squared() + step.dot(&products));
-        Some(ScreenedPair {
-            hypothesis: Hypothesis {
-                parts: vec![part(0), part(1)],
-            },
-            score: atlas.score_of_pair(probes, gain),
-            left: self.residual.norm_squared() - 2.0 * gain,
-            sizes,
-        })
+        let deviance = scatter.deviance(&left) - step.dot(&products);
+        let gain = 0.5 * (self.residual.norm_squared() - deviance);
+        Some(atlas.screened_pair(probes, sizes, gain, deviance))
     }
 }

@@ -6,8 +6,8 @@ use sim::{Pattern, Setting};
 
 use super::atlas::Atlas;
 use super::intervals::Interval;
+use super::path::at;
 use super::probe::{Probe, other_at_place};
-use super::screen::at;
 use crate::candidate::apart;
 use crate::slip::{level_of, memory_of};
 
@@ -457,7 +457,8 @@ mod tests {
         assert!(atlas.do_alike(&one, &other));
         // The other puts the first run to the other side.
         let first = atlas.layout.run(0);
-        for action in atlas.paths[1].iter_mut().flatten() {
+        for departure in atlas.paths[1].iter_mut().flatten() {
+            let action = &mut departure.action;
             action.rows_mut(first.start, first.len()).scale_mut(-1.0);
         }
         assert!(!atlas.do_alike(&one, &other));

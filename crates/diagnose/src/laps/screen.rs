@@ -1,7 +1,5 @@
 //! Which probes could explain a residual, by the paths that were simulated beforehand.
 
-use std::ops::Range;
-
 use rayon::prelude::*;
 use sim::UNLISTED;
 
@@ -9,12 +7,13 @@ use super::atlas::{Atlas, White};
 use super::hypothesis::Hypothesis;
 use super::layout::ramp_norm;
 use super::part::{Part, Shape};
+use super::path::{Node, Path, tangent};
 
 /// A probe at the size that explains most.
 #[derive(Debug, Clone)]
 pub(super) struct Screened {
     pub(super) hypothesis: Hypothesis,
-    /// Half the squared distance to the residual that is gained, less the price of its parameters.
+    /// Log-likelihood that is gained as far as its path tells, less the price of its parameters.
     pub(super) score: f64,
 }
 
@@ -40,72 +39,53 @@ pub(super) fn price(parameters: usize, laps: usize) -> f64 {
 impl Atlas {
     /// Every probe in every pattern at its best size, best first.
     pub(super) fn screen(&self, residual: &White) -> Vec<Screened> {
-        self.screen_by(residual, White::clone)
+        self.screen_by(residual, White::clone, None)
     }
 
-    /// The same by actions that are seen in another way, in which the residual is given.
-    pub(super) fn screen_by(&self, residual: &White, seen: impl Fn(&White) -> White + Sync) -> Vec<Screened> {
-        let mut all: Vec<Screened> = (0..self.probes.len())
-            .into_par_iter()
-            .flat_map_iter(|probe| {
-                let mut nodes = self.nodes(probe);
-                for (_, action) in &mut nodes {
-                    *action = seen(action);
-                }
-                [Shape::Constant, Shape::ByRun, Shape::ByTime]
-                    .map(|shape| self.screen_one(probe, &nodes, shape, residual))
-            })
-            .flatten()
-            .collect();
-        all.sort_by(|a, b| b.score.total_cmp(&a.score));
-        all
+    /// The same by actions that are seen in another way, in which the residual is given, of data that scatter so much more, entry by
+    /// entry of a turned data set, than in these units.
+    pub(super) fn screen_by(
+        &self,
+        residual: &White,
+        seen: impl Fn(&White) -> White + Sync,
+        widened: Option<&White>,
+    ) -> Vec<Screened> {
+        const SHAPES: [Shape; 3] = [Shape::Constant, Shape::ByRun, Shape::ByTime];
+        let target = Target::new(self, residual, widened);
+        let screened = |probe: usize| {
+            let mut nodes = self.nodes(probe);
+            for (_, action) in &mut nodes {
+                *action = seen(action);
+            }
+            let path = self.path(probe, &nodes, widened);
+            SHAPES.map(|shape| self.screen_one(probe, &nodes, &path, shape, &target))
+        };
+        let all = (0..self.probes.len()).into_par_iter().flat_map_iter(screened);
+        best_first(all.flatten().collect())
     }
 
     /// The best constant score over all probes: what the alarm looks at.
     pub(super) fn best_score(&self, residual: &White) -> f64 {
-        let all = self.screen_constant(0..self.probes.len(), residual);
-        all.map(|s| s.score).fold(0.0, f64::max)
+        let best = self
+            .ranked_constant(0..self.probes.len(), residual)
+            .into_iter()
+            .next();
+        best.map_or(0.0, |best| best.score.max(0.0))
     }
 
-    /// Some probes of constant size, each at its best.
-    pub(super) fn screen_constant(
-        &self,
-        probes: impl Iterator<Item = usize>,
-        residual: &White,
-    ) -> impl Iterator<Item = Screened> {
-        probes.filter_map(|probe| self.screen_one(probe, &self.nodes(probe), Shape::Constant, residual))
-    }
-
-    /// The same, best first.
+    /// Some probes of constant size, each at its best, best first.
     pub(super) fn ranked_constant(
         &self,
         probes: impl Iterator<Item = usize>,
         residual: &White,
     ) -> Vec<Screened> {
-        let mut screened: Vec<Screened> = self.screen_constant(probes, residual).collect();
-        screened.sort_by(|a, b| b.score.total_cmp(&a.score));
-        screened
-    }
-
-    /// Sizes and actions along a probe's path, the neutral size among them, in order of size.
-    pub(super) fn nodes(&self, probe: usize) -> Vec<(f64, White)> {
-        let p = &self.probes[probe];
-        let simulated = p
-            .sizes
-            .iter()
-            .zip(&self.paths[probe])
-            .filter_map(|(&s, w)| w.as_ref().map(|w| (s, w.clone())));
-        let mut nodes: Vec<(f64, White)> = simulated.collect();
-        let Some(length) = nodes.first().map(|(_, w)| w.len()) else {
-            return nodes;
+        let target = Target::new(self, residual, None);
+        let screened = |probe: usize| {
+            let nodes = self.nodes(probe);
+            let path = self.path(probe, &nodes, None);
+            self.screen_one(probe, &nodes, &path, Shape::Constant, &target)
         };
-        if p.odd {
-            let mirrored: Vec<_> = nodes.iter().map(|(s, w)| (2.0 * p.neutral - s, -w)).collect();
-            nodes.extend(mirrored);
-        }
-        nodes.push((p.neutral, White::zeros(length)));
-        nodes.sort_by(|a, b| a.0.total_cmp(&b.0));
-        nodes
+        best_first(probes.filter_map(screened).collect())
     }
 
     /// The price of having chosen one probe among those of its effect: the logarithm of how many there are, less what is
@@ -145,50 +125,50 @@ impl Atlas {
         &self,
         probe: usize,
         nodes: &[(f64, White)],
+        path: &Path,
         shape: Shape,
-        residual: &White,
+        target: &Target,
     ) -> Option<Screened> {
         let p = &self.probes[probe];
         let runs = self.layout.runs();
-        let everything = 0..residual.len();
-        let (size_at, action, fitted) = match shape {
+        let everything = 0..target.turned.len();
+        let (size_at, node, fitted) = match shape {
             Shape::Constant => {
-                let (s, action) = nearest(nodes, residual, everything)?;
-                (vec![s], action, p.free.len())
+                let node = path.likeliest(&target.turned, everything)?;
+                (vec![node.size], node, p.free.len())
             }
             Shape::ByRun => {
                 if runs < 2 {
                     return None;
                 }
-                let parts: Option<Vec<(f64, White)>> = (0..runs)
-                    .map(|run| nearest(nodes, residual, self.layout.run(run)))
+                let parts: Option<Vec<Node>> = (0..runs)
+                    .map(|run| path.likeliest(&target.turned, self.layout.run(run)))
                     .collect();
                 let parts = parts?;
-                let mut action = at(nodes, parts.iter().map(|part| part.0).sum::<f64>() / runs as f64);
-                for (run, (_, part)) in parts.iter().enumerate() {
-                    let range = self.layout.run(run);
-                    action
-                        .rows_mut(range.start, range.len())
-                        .copy_from(&part.rows(range.start, range.len()));
+                let mut node = path.at(parts.iter().map(|part| part.size).sum::<f64>() / runs as f64);
+                for (run, part) in parts.iter().enumerate() {
+                    node.take(self.layout.run(run), part);
                 }
-                let sizes = parts.into_iter().map(|part| part.0).collect();
+                let sizes = parts.into_iter().map(|part| part.size).collect();
                 let by_run = p.free.iter().filter(|free| p.moves(free.0)).count();
-                (sizes, action, p.free.len() + by_run * (runs - 1))
+                (sizes, node, p.free.len() + by_run * (runs - 1))
             }
             // What changes in time by itself is no candidate for a change of that change.
             Shape::ByTime if p.drifts() => return None,
             Shape::ByTime => {
-                let (s, action) = nearest(nodes, residual, everything)?;
-                let change = self.change_per_lap(&tangent(nodes, s));
-                let left = residual - &action;
-                let slope = change.dot(&left) / change.norm_squared().max(f64::MIN_POSITIVE);
-                (vec![s, slope], action + change * slope, p.free.len() + 1)
+                let node = path.likeliest(&target.turned, everything)?;
+                let change = self.turned(&self.change_per_lap(&tangent(nodes, node.size)));
+                let weighted = change.component_mul(&node.weights());
+                let left = &target.turned - &node.action;
+                let slope = weighted.dot(&left) / weighted.dot(&change).max(f64::MIN_POSITIVE);
+                let action = &node.action + change * slope;
+                (vec![node.size, slope], Node { action, ..node }, p.free.len() + 1)
             }
         };
-        let gain = residual.norm_squared() - (residual - &action).norm_squared();
+        let gain = 0.5 * (target.deviance - node.deviance(&target.turned));
         Some(Screened {
             hypothesis: Hypothesis::of(Part::screened(self, probe, shape, &size_at)),
-            score: self.screened_score(probe, shape, fitted, 0.5 * gain),
+            score: self.screened_score(probe, shape, fitted, gain),
         })
     }
 
@@ -214,9 +194,6 @@ pub(super) fn without_directions(mut vector: White, directions: &[White]) -> Whi
 /// Share of a gain that faults of the paths may take: they are straight between few sizes.
 const FAULTS: f64 = 0.01;
 
-/// Share of its last piece by which a path is trusted to go on straight.
-pub(super) const BEYOND: f64 = 0.7;
-
 /// What counts of a gain of which faults may take a share: sizes that may go over the runs follow them.
 pub(super) fn worth(gain: f64, shape: Shape, faults: f64) -> f64 {
     /// What a pattern has to gain beside its numbers.
@@ -227,61 +204,39 @@ pub(super) fn worth(gain: f64, shape: Shape, faults: f64) -> f64 {
     }
 }
 
-/// The point of a path that is nearest to the residual in some entries, and its size. Beyond its ends the path goes on
-/// straight for [`BEYOND`] of its last piece.
-pub(super) fn nearest(
-    nodes: &[(f64, White)],
-    residual: &White,
-    entries: Range<usize>,
-) -> Option<(f64, White)> {
-    let (first, count) = (entries.start, entries.len());
-    let target = residual.rows(first, count);
-    let mut best: Option<(f64, f64, White)> = None;
-    for (i, pair) in nodes.windows(2).enumerate() {
-        let ((s0, w0), (s1, w1)) = (&pair[0], &pair[1]);
-        let (from, along) = (
-            w0.rows(first, count),
-            w1.rows(first, count) - w0.rows(first, count),
-        );
-        let square = along.norm_squared();
-        if square == 0.0 {
-            continue;
-        }
-        let low = if i == 0 { -BEYOND } else { 0.0 };
-        let high = if i + 2 == nodes.len() { 1.0 + BEYOND } else { 1.0 };
-        let share = ((target - from).dot(&along) / square).clamp(low, high);
-        let distance = (target - from - along * share).norm_squared();
-        if best.as_ref().is_none_or(|(least, ..)| distance < *least) {
-            best = Some((distance, s0 + share * (s1 - s0), w0 + (w1 - w0) * share));
-        }
+/// Best first.
+fn best_first(mut screened: Vec<Screened>) -> Vec<Screened> {
+    screened.sort_by(|a, b| b.score.total_cmp(&a.score));
+    screened
+}
+
+/// What is to be explained.
+struct Target {
+    turned: White,
+    /// Of what explains nothing of it.
+    deviance: f64,
+}
+
+impl Target {
+    /// A residual of data that scatter so much more than in its units.
+    fn new(atlas: &Atlas, residual: &White, widened: Option<&White>) -> Self {
+        let turned = atlas.turned(residual);
+        let deviance = match widened {
+            Some(widened) => Node::at_rest(widened.clone()).deviance(&turned),
+            None => turned.norm_squared(),
+        };
+        Self { turned, deviance }
     }
-    best.map(|(_, s, w)| (s, w))
-}
-
-/// The path at a size, straight on beyond its ends.
-pub(super) fn at(nodes: &[(f64, White)], size: f64) -> White {
-    let (from, slope) = piece(nodes, size);
-    &from.1 + slope * (size - from.0)
-}
-
-/// The change of the path with the size.
-pub(super) fn tangent(nodes: &[(f64, White)], size: f64) -> White {
-    piece(nodes, size).1
-}
-
-/// The piece of a path that holds a size: its first node and its slope.
-fn piece(nodes: &[(f64, White)], size: f64) -> (&(f64, White), White) {
-    let i = nodes
-        .windows(2)
-        .position(|pair| size < pair[1].0)
-        .unwrap_or(nodes.len() - 2);
-    let slope = (&nodes[i + 1].1 - &nodes[i].1) / (nodes[i + 1].0 - nodes[i].0);
-    (&nodes[i], slope)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::laps::atlas::observed;
+    use crate::laps::probe::probes;
+    use crate::laps::spread::Spread;
+    use crate::laps::summary::Summary;
+    use crate::laps::testing::{simulated, summaries, twice_as_wide};
 
     #[test]
     fn what_follows_is_taken_off() {
@@ -292,5 +247,27 @@ mod tests {
         let left = without_directions(White::from_vec(vec![7.0, 3.0, -1.0]), &directions);
         // (3, -1) less its projection of 1 on (0.6, 0.8).
         assert!((left - White::from_vec(vec![0.0, 2.4, -1.8])).norm() < 1e-15);
+    }
+
+    #[test]
+    fn what_only_scatters_more_explains_laps_that_do() {
+        let mut known = probes(0.032);
+        known.retain(|probe| ["wheel-scale", "axle-length"].contains(&probe.spec.name));
+        let mut atlas = Atlas::with_probes(&simulated, &[], true, known, &|| ()).unwrap();
+        let wide = twice_as_wide(2);
+        for departure in atlas.paths[1].iter_mut().flatten() {
+            departure.action.fill(0.0);
+            departure.spread = Spread::of(&atlas.axes, &wide, &atlas.variances);
+        }
+        let score = |sets: &[Summary]| {
+            let residual = atlas.white(&observed(&sets[0]), &atlas.null);
+            let screened = atlas.screen(&residual);
+            [0, 1].map(|probe| screened.iter().find(|s| s.probe() == probe).map(|s| s.score))
+        };
+        let [mean, scatter] = score(&wide);
+        // Laps of variance 4 in three draws of 60 entries: half of 180 (4 - 1 - ln 4).
+        assert!(mean < Some(10.0) && scatter > Some(100.0), "{mean:?} {scatter:?}");
+        let [mean, scatter] = score(&summaries(1));
+        assert!(mean < Some(2.0) && scatter < Some(2.0), "{mean:?} {scatter:?}");
     }
 }

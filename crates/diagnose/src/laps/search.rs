@@ -13,7 +13,6 @@ use super::hypothesis::Hypothesis;
 use super::intervals::Interval;
 use super::observed::ObservedRun;
 use super::part::{Freedom, Part, Shape};
-use super::pieces::ScreenedPair;
 use super::refine::{Descent, Settled};
 use super::ripple::Ripple;
 use super::rounds::{
@@ -23,6 +22,7 @@ use super::scans::Scan;
 use super::screen::Screened;
 use super::steadiness::Settling;
 use super::tests_of_fit::{Departures, Quadratic, SIGNIFICANT_P};
+use super::together::ScreenedPair;
 use super::trial::Trial;
 use super::verdict::is_noise;
 use crate::{Candidate, Explanation, Watch};

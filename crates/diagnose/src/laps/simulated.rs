@@ -9,6 +9,7 @@ use super::atlas::{Atlas, Extent, Simulate, Spent, White};
 use super::expectation::Expectation;
 use super::hypothesis::Hypothesis;
 use super::likelihood::Doubt;
+use super::path::Node;
 use super::summary::Summary;
 use super::trial::Trial;
 
@@ -115,6 +116,16 @@ impl Trial<'_> {
             .atlas
             .simulated_until(self.simulate, settings, sets, error, self.spent)?;
         Some(found.expectation)
+    }
+
+    /// What a hypothesis leaves of the data, turned, and how wide it scatters about nothing, as so many data sets tell or as few of them
+    /// as make it as good; `None` where the robot crashes.
+    pub(super) fn heard(&self, hypothesis: &Hypothesis, sets: u64) -> Option<(White, Node)> {
+        let (atlas, error) = (self.atlas, 1.0 / sets as f64);
+        let settings = hypothesis.settings(atlas);
+        let found = atlas.simulated_until(self.simulate, &settings, 0..sets, error, self.spent)?;
+        let left = atlas.turned(&atlas.white(self.data, &found.expectation));
+        Some((left, Node::at_rest(atlas.widened(&found.summaries))))
     }
 
     /// What effects leave of the data, in units of their own scatter; `None` where the robot crashes. That a lap is lost now and

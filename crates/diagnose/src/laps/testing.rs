@@ -5,6 +5,7 @@ use sim::{Pattern, Setting, find};
 use super::atlas::{Atlas, Extent};
 use super::observed::{ObservedLap, ObservedRun};
 use super::probe::probes;
+use super::summary::Summary;
 
 const GATES: usize = 40;
 
@@ -58,4 +59,35 @@ pub(super) fn atlas() -> Atlas {
 /// A wheel scale that puts laps aside by so many mm.
 pub(super) fn aside(mm: f64) -> [Setting; 1] {
     [Setting::constant(find("wheel-scale").expect("an effect"), [mm])]
+}
+
+/// So many of this robot's data sets.
+pub(super) fn summaries(sets: u64) -> Vec<Summary> {
+    summaries_of(sets, |_| ())
+}
+
+/// The same of laps that scatter twice as wide.
+pub(super) fn twice_as_wide(sets: u64) -> Vec<Summary> {
+    summaries_of(sets, |lap| {
+        (lap.offsets_m.iter_mut()).for_each(|offset_m| *offset_m *= 2.0);
+        // From gate to gate it is a second but for what scatters.
+        let start_s = lap.times_s[0];
+        let wider = |(gate, time_s): (usize, &mut f64)| {
+            let mean_s = start_s + gate as f64;
+            *time_s = mean_s + 2.0 * (*time_s - mean_s);
+        };
+        let times_s = lap.times_s.iter_mut().chain(std::iter::once(&mut lap.end_s));
+        times_s.enumerate().for_each(wider);
+    })
+}
+
+fn summaries_of(sets: u64, change: impl Fn(&mut track::Lap)) -> Vec<Summary> {
+    let summary = |set: u64| {
+        let mut runs = simulated(&[], set, Extent::Whole).expect("it drives its laps");
+        for lap in runs.iter_mut().flat_map(|run| &mut run.laps) {
+            change(&mut lap.smooth);
+        }
+        Summary::new(&runs, &[runs.len()]).expect("runs of five laps")
+    };
+    (0..sets).map(summary).collect()
 }
