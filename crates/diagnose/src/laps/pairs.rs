@@ -246,21 +246,27 @@ impl Search<'_> {
         keep
     }
 
-    /// Pairs that were screened with the scores and sizes that simulations of both together give them, best first: actions do not quite
-    /// add up.
-    fn heard_pairs(&self, screened: Vec<ScreenedPair>) -> Vec<ScreenedPair> {
-        let heard = |pair: ScreenedPair| self.heard_pair(pair);
-        let mut pairs: Vec<ScreenedPair> = screened.into_par_iter().filter_map(heard).collect();
-        pairs.sort_by(|a, b| b.score.total_cmp(&a.score));
+    /// The best of the pairs that were screened, with the scores and sizes that simulations of both together give them, best first:
+    /// actions do not quite add up. Few data sets tell which are worth more (a race).
+    fn heard_pairs(&self, mut pairs: Vec<ScreenedPair>) -> Vec<ScreenedPair> {
+        /// Data sets by which those that are left are told apart, and how many of them then are.
+        const RACE: [(u64, usize); 2] = [(1, 32), (4, 32)];
+        for (sets, taken) in RACE {
+            let heard = pairs
+                .into_par_iter()
+                .filter_map(|pair| self.heard_pair(pair, sets));
+            pairs = heard.collect();
+            pairs.sort_by(|a, b| b.score.total_cmp(&a.score));
+            pairs.truncate(taken);
+        }
         pairs
     }
 
     /// A pair after one step of Gauss and Newton's method along the paths of its probes; `None` where the robot crashes.
-    fn heard_pair(&self, pair: ScreenedPair) -> Option<ScreenedPair> {
-        const SETS: u64 = 4;
+    fn heard_pair(&self, pair: ScreenedPair, sets: u64) -> Option<ScreenedPair> {
         let atlas = self.atlas();
         let probes = [0, 1].map(|i| pair.hypothesis.parts[i].probe);
-        let (left, scatter) = self.trial.heard(&pair.hypothesis, SETS)?;
+        let (left, scatter) = self.trial.heard(&pair.hypothesis, sets)?;
         let weights = scatter.weights();
         let moves = [0, 1].map(|i| atlas.turned(&tangent(&atlas.nodes(probes[i]), pair.sizes[i])));
         let [a, b] = [0, 1].map(|i| moves[i].component_mul(&weights));
