@@ -29,10 +29,11 @@ impl Atlas {
     /// after the other does not: the best single explanation of two effects is often a third. Effects that jump are left out: their
     /// paths tell nothing.
     pub(super) fn screen_pairs(&self, residual: &White, most: usize) -> Vec<ScreenedPair> {
-        let target = Pooled::new(self, residual);
+        let pools = self.pools();
+        let target = Pooled::new(&pools, &self.turned(residual));
         let pieces: Vec<PooledPiece> = (0..self.probes.len())
             .filter(|&probe| !self.probes[probe].jumps())
-            .flat_map(|probe| self.pooled_pieces(probe))
+            .flat_map(|probe| self.pooled_pieces(probe, &pools))
             .collect();
         let with_later = |i: usize| {
             let a = &pieces[i];
@@ -94,16 +95,15 @@ impl Atlas {
         gain - probes.map(price_of).iter().sum::<f64>()
     }
 
-    fn pooled_pieces(&self, probe: usize) -> Vec<PooledPiece> {
+    fn pooled_pieces(&self, probe: usize, pools: &[Pool]) -> Vec<PooledPiece> {
         let path = self.path(probe, &self.nodes(probe), None);
         (path.ways())
-            .map(|(nodes, bounds)| PooledPiece::new(self, probe, nodes, bounds))
+            .map(|(nodes, bounds)| PooledPiece::new(pools, probe, nodes, bounds))
             .collect()
     }
 
-    /// Entries of a turned data set that no constant effect tells apart, and the share that each has of what they have in common: those
-    /// of runs that are alike, entry by entry, and every other one for itself.
-    fn pools(&self) -> Vec<Vec<(usize, f64)>> {
+    /// Runs that are alike, entry by entry, and every other entry for itself.
+    fn pools(&self) -> Vec<Pool> {
         let mut pools = Vec::new();
         let mut first_run = 0;
         for (recording, laps) in self.layout.laps.iter().enumerate() {
@@ -129,9 +129,12 @@ impl Atlas {
     }
 }
 
+/// Entries of a turned data set that no constant effect tells apart, and the share that each has of what they have in common.
+type Pool = Vec<(usize, f64)>;
+
 /// What the entries of each pool have in common.
-fn pooled(pools: &[Vec<(usize, f64)>], turned: &White) -> Vec<f64> {
-    let in_common = |pool: &Vec<(usize, f64)>| pool.iter().map(|(entry, share)| share * turned[*entry]).sum();
+fn pooled(pools: &[Pool], turned: &White) -> Vec<f64> {
+    let in_common = |pool: &Pool| pool.iter().map(|(entry, share)| share * turned[*entry]).sum();
     pools.iter().map(in_common).collect()
 }
 
@@ -144,10 +147,9 @@ struct Pooled {
 }
 
 impl Pooled {
-    fn new(atlas: &Atlas, residual: &White) -> Self {
-        let (pools, turned) = (atlas.pools(), atlas.turned(residual));
-        let target = pooled(&pools, &turned);
-        let rest = |(pool, common): (&Vec<(usize, f64)>, &f64)| {
+    fn new(pools: &[Pool], turned: &White) -> Self {
+        let target = pooled(pools, turned);
+        let rest = |(pool, common): (&Pool, &f64)| {
             let square: f64 = pool.iter().map(|(entry, _)| turned[*entry].powi(2)).sum();
             (square - common * common).max(0.0)
         };
@@ -161,17 +163,18 @@ impl Pooled {
     /// ones that are nearest to where it leads.
     fn likeliest(&self, pieces: [&PooledPiece; 2]) -> (f64, [f64; 2]) {
         const TURNS: usize = 4;
-        let mut shares = pieces.map(|piece| 0.5 * (piece.bounds[0] + piece.bounds[1]));
-        for turn in 1.. {
-            let near = [0, 1].map(|i| pieces[i].nearest(shares[i]));
-            let (deviance, found) = self.likeliest_scattering(pieces, near);
-            let is_there = [0, 1].map(|i| pieces[i].nearest(found[i])) == near;
-            if is_there || turn == TURNS {
-                return (deviance, found);
+        let nearest = |shares: [f64; 2]| [0, 1].map(|i| pieces[i].nearest(shares[i]));
+        let mut at = nearest(pieces.map(|piece| 0.5 * (piece.bounds[0] + piece.bounds[1])));
+        let mut found = self.likeliest_scattering(pieces, at);
+        for _ in 1..TURNS {
+            let there = nearest(found.1);
+            if there == at {
+                break;
             }
-            shares = found;
+            at = there;
+            found = self.likeliest_scattering(pieces, at);
         }
-        unreachable!("turns are counted")
+        found
     }
 
     /// The same where both scatter as they do at some of their shares.
@@ -254,9 +257,8 @@ struct PooledScatter {
 }
 
 impl PooledPiece {
-    fn new(atlas: &Atlas, probe: usize, nodes: [&Node; 2], bounds: [f64; 2]) -> Self {
-        let pools = atlas.pools();
-        let [from, to] = nodes.map(|node| pooled(&pools, &node.action));
+    fn new(pools: &[Pool], probe: usize, nodes: [&Node; 2], bounds: [f64; 2]) -> Self {
+        let [from, to] = nodes.map(|node| pooled(pools, &node.action));
         // The entries of a pool scatter as its first one.
         let widened =
             nodes.map(|node| -> Vec<f64> { pools.iter().map(|pool| node.widened[pool[0].0]).collect() });
@@ -272,7 +274,7 @@ impl PooledPiece {
             let share = piece.share(k);
             let widened = widened[0].iter().zip(&widened[1]);
             let widened = widened.map(|(from, to)| from + share * (to - from));
-            let of_pools = widened.clone().zip(&pools);
+            let of_pools = widened.clone().zip(pools);
             PooledScatter {
                 log_determinant: of_pools.map(|(widened, pool)| pool.len() as f64 * widened).sum(),
                 weights: widened.map(|widened| (-widened).exp()).collect(),
@@ -378,8 +380,9 @@ mod tests {
         for alike in [true, false] {
             atlas.alike = alike;
             let residual = atlas.white(&atlas.samples[3], &atlas.null) * 3.0;
-            let target = Pooled::new(&atlas, &residual);
-            let [a, b] = [0, 1].map(|probe| atlas.pooled_pieces(probe).remove(1));
+            let pools = atlas.pools();
+            let target = Pooled::new(&pools, &atlas.turned(&residual));
+            let [a, b] = [0, 1].map(|probe| atlas.pooled_pieces(probe, &pools).remove(1));
             let (deviance, shares) = target.likeliest_scattering([&a, &b], [3, 6]);
             let at = |piece: &PooledPiece, share: f64| {
                 let path = atlas.path(piece.probe, &atlas.nodes(piece.probe), None);
