@@ -37,7 +37,7 @@ impl Search<'_> {
     }
 
     /// Of a weak signal the effects beside a shortlist that are likeliest at the sizes that a screening found: by the noise of its
-    /// paths it tells little of them, and nothing of what they do to the scatter.
+    /// paths it tells little of them.
     fn auditioned<'s>(&self, screened: &'s [Screened], listed: &[&'s Screened]) -> Vec<&'s Screened> {
         const HEARD: usize = 20;
         const SHARE: f64 = 0.5;
