@@ -35,11 +35,18 @@ impl Atlas {
         // A score has Schwarz's price, the same for every number, in place of the share of its range that the data leave it.
         let schwarz = price(1, self.layout.total_laps());
         let way = |found: &Found| {
-            let shares = found.hypothesis.shares_left(&found.errors, self);
+            let Found {
+                hypothesis,
+                errors,
+                correlation,
+                ..
+            } = found;
+            let shares = hypothesis.shares_left(errors, self);
             Way {
                 answer: classes_of(&found.explanation),
                 score: found.explanation.score,
-                occam: shares.iter().map(|share| share.ln() + schwarz).sum(),
+                occam: shares.iter().map(|share| share.ln() + schwarz).sum::<f64>()
+                    + hypothesis.made_up_for(errors, correlation, self),
             }
         };
         let ways: Vec<_> = found.iter().map(way).collect();

@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use nalgebra::{DMatrix, DVector};
 use sim::Setting;
 
 use super::atlas::Atlas;
@@ -249,7 +250,7 @@ impl Hypothesis {
 
     /// The shares that data leave, with these errors, of what robots of this kind do, one for each number: their product is the Occam
     /// factor of Laplace's approximation of how probable the data are where only these ranges are known beforehand (Kass and
-    /// Raftery 1995). Of sizes by run their mean counts, and no change in time: how far robots change is less known.
+    /// Raftery 1995), if these errors have nothing to do with each other. Of sizes by run their mean counts, and no change in time: how far robots change is less known.
     pub(super) fn shares_left(&self, errors: &[(Freedom, f64)], atlas: &Atlas) -> Vec<f64> {
         let moved = errors.iter().filter_map(|(freedom, error)| {
             let part = &self.parts[freedom.part];
@@ -266,6 +267,24 @@ impl Hypothesis {
             Some(share_left(part.held?, None, range))
         });
         moved.chain(held).collect()
+    }
+
+    /// What the logarithm of that Occam factor is beyond that of the product: less than nothing where one number makes up for what
+    /// another is off.
+    pub(super) fn made_up_for(
+        &self,
+        errors: &[(Freedom, f64)],
+        correlation: &DMatrix<f64>,
+        atlas: &Atlas,
+    ) -> f64 {
+        let always = |(i, (freedom, error)): (usize, &(Freedom, f64))| {
+            let counts = freedom.run.is_none() && freedom.quantum.is_none();
+            let range = self.far(freedom, atlas).filter(|_| counts)?;
+            Some((i, (range / error).powi(2) / std::f64::consts::TAU))
+        };
+        let (numbers, ranges): (Vec<usize>, Vec<f64>) = errors.iter().enumerate().filter_map(always).unzip();
+        let correlation = correlation.select_rows(&numbers).select_columns(&numbers);
+        log_volume(&correlation, &DVector::from_vec(ranges))
     }
 
     /// The numbers that a descent may change.
@@ -345,6 +364,15 @@ fn share_left(error: f64, step: Option<f64>, range: f64) -> f64 {
     (left / range).min(1.0)
 }
 
+/// The logarithm of the volume that normal errors with such a correlation leave within normal ranges, whose squares are given in units of
+/// those of the errors, in units of the volume that independent errors leave.
+fn log_volume(correlation: &DMatrix<f64>, ranges: &DVector<f64>) -> f64 {
+    let log_determinant = |matrix: DMatrix<f64>| matrix.determinant().max(f64::MIN_POSITIVE).ln();
+    let within = log_determinant(correlation + DMatrix::from_diagonal(ranges));
+    let independent: f64 = ranges.iter().map(|range| range.ln_1p()).sum();
+    0.5 * (log_determinant(correlation.clone()) - within + independent)
+}
+
 /// The squares by which values with errors differ from their weighted mean.
 fn differ(values: &[(f64, f64)]) -> Quadratic {
     let weight = |error: f64| error.powi(-2);
@@ -376,6 +404,19 @@ mod tests {
             assert!((share - mean_over(error, &ten)).abs() < 0.02, "{error}: {share}");
         }
         assert_eq!(share_left(20.0, None, 10.0), 1.0);
+    }
+
+    #[test]
+    fn numbers_that_make_up_for_each_other_share_less_of_wide_ranges_alone() {
+        let correlation = DMatrix::from_row_slice(2, 2, &[1.0, 0.8, 0.8, 1.0]);
+        let volume = |ranges: f64| log_volume(&correlation, &DVector::from_element(2, ranges));
+        // The square of .8 is .64: of their independent volume .6 is left.
+        assert!((volume(1e9) - 0.6_f64.ln()).abs() < 1e-6);
+        assert!(volume(1e-9).abs() < 1e-6);
+        // 1 + r and their sum and difference: r + 1.8 and r + .2.
+        assert!((volume(1.0) - 0.5 * (0.36 * 4.0 / (2.8 * 1.2_f64)).ln()).abs() < 1e-12);
+        let independent = log_volume(&DMatrix::identity(3, 3), &DVector::from_element(3, 7.0));
+        assert!(independent.abs() < 1e-12);
     }
 
     #[test]

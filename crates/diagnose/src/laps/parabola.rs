@@ -265,6 +265,15 @@ pub(super) struct Nearest {
     pub(super) hoped: f64,
 }
 
+impl Nearest {
+    /// How the errors of the moves go together.
+    pub(super) fn correlation(&self) -> DMatrix<f64> {
+        let deviations = self.covariance.diagonal().map(f64::sqrt);
+        let scaled = |i: usize, j: usize| self.covariance[(i, j)] / (deviations[i] * deviations[j]);
+        DMatrix::from_fn(deviations.len(), deviations.len(), scaled)
+    }
+}
+
 impl Trial<'_> {
     /// Where parabolas through a simulated hypothesis are nearest to the data, in units of a scatter that widens with its numbers: where
     /// the likelihood is highest.

@@ -71,6 +71,8 @@ pub(super) struct Refined {
     pub(super) hypothesis: Hypothesis,
     /// Standard errors of the fitted numbers, the simulation's own error included.
     pub(super) errors: Vec<(Freedom, f64)>,
+    /// How these go together.
+    pub(super) correlation: DMatrix<f64>,
     pub(super) fit: Fit,
     /// The gain less the price of the fitted numbers.
     pub(super) score: f64,
@@ -88,6 +90,8 @@ pub(super) struct Descent {
     pub(super) hypothesis: Hypothesis,
     freedoms: Vec<Freedom>,
     errors: Vec<f64>,
+    /// How these go together.
+    correlation: DMatrix<f64>,
     /// Log-likelihood gained over the declared model less the price of the fitted numbers, as the last round saw it.
     pub(super) score: f64,
     /// Standard deviation of that for the simulation's own error.
@@ -177,6 +181,7 @@ impl Descent {
         Self {
             hypothesis: hypothesis.clone(),
             errors: vec![f64::INFINITY; freedoms.len()],
+            correlation: DMatrix::identity(freedoms.len(), freedoms.len()),
             score: f64::NEG_INFINITY,
             score_error: 0.0,
             progress: f64::INFINITY,
@@ -357,6 +362,7 @@ impl Trial<'_> {
             looks,
             ..
         } = descent;
+        let correlation = nearest.correlation();
         let Nearest { moves, errors, .. } = nearest;
         let hypothesis = self.atlas.with_moves(&hypothesis, &freedoms, &moves);
         let found = full && is_settled(&moves, &nearest.covariance, &freedoms);
@@ -385,6 +391,7 @@ impl Trial<'_> {
             hypothesis,
             freedoms,
             errors,
+            correlation,
         })
     }
 
@@ -405,6 +412,7 @@ impl Trial<'_> {
         let nearest = self.nearest(&center, &local.scatter, &columns, &freedoms);
         let fit = self.fit_with_error(&center)?;
         let gain = self.hoped_gain(&descent.hypothesis, &fit, nearest.hoped);
+        let correlation = nearest.correlation();
         let Nearest {
             moves, errors, hoped, ..
         } = nearest;
@@ -439,6 +447,7 @@ impl Trial<'_> {
             hypothesis,
             freedoms,
             errors,
+            correlation,
         })
     }
 
@@ -469,7 +478,8 @@ impl Trial<'_> {
         };
         let end = self.evaluate_more(&hypothesis, &simulated, sets)?;
         let fit = self.fit_with_error(&end)?;
-        Some(self.atlas.settled(hypothesis, found.errors(), fit, end))
+        let errors = (found.errors(), found.correlation.clone());
+        Some(self.atlas.settled(hypothesis, errors, fit, end))
     }
 
     /// Whether a hypothesis that may be settled was better before its numbers moved to where the robot may crash.
@@ -493,8 +503,12 @@ impl Trial<'_> {
         let fits = self.fits_of_rivals(&evaluated.iter().collect::<Vec<_>>());
         (refined.into_iter().zip(evaluated).zip(fits.unwrap_or_default()))
             .map(|((refined, evaluated), fit)| {
-                self.atlas
-                    .settled(refined.hypothesis, refined.errors, fit, evaluated)
+                self.atlas.settled(
+                    refined.hypothesis,
+                    (refined.errors, refined.correlation),
+                    fit,
+                    evaluated,
+                )
             })
             .collect()
     }
@@ -576,6 +590,7 @@ impl Atlas {
                 hoped: to.hoped,
             }),
             errors: vec![to.error],
+            correlation: DMatrix::identity(1, 1),
             hypothesis,
             freedoms,
         }
@@ -614,7 +629,7 @@ impl Atlas {
     fn settled(
         &self,
         hypothesis: Hypothesis,
-        errors: Vec<(Freedom, f64)>,
+        (errors, correlation): (Vec<(Freedom, f64)>, DMatrix<f64>),
         fit: Fit,
         evaluated: Evaluated,
     ) -> Settled {
@@ -622,6 +637,7 @@ impl Atlas {
         let refined = Refined {
             hypothesis,
             errors,
+            correlation,
             fit,
             score,
         };

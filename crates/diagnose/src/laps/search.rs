@@ -6,6 +6,7 @@ use std::fmt::Arguments;
 use std::ops::Range;
 use std::sync::OnceLock;
 
+use nalgebra::DMatrix;
 use sim::Vec2;
 
 use super::atlas::{Atlas, White};
@@ -33,6 +34,8 @@ pub(super) struct Found {
     pub(super) hypothesis: Hypothesis,
     /// Standard errors of its fitted numbers.
     pub(super) errors: Vec<(Freedom, f64)>,
+    /// How these go together.
+    pub(super) correlation: DMatrix<f64>,
     pub(super) explanation: Explanation,
     /// Standard deviation of its log-likelihood for the simulation's own error.
     pub(super) gain_error: f64,
@@ -412,6 +415,7 @@ impl Search<'_> {
             residual: refined.fit.residual.clone(),
             hypothesis: refined.hypothesis.clone(),
             errors: refined.errors.clone(),
+            correlation: refined.correlation.clone(),
             explanation: Explanation {
                 effects: candidates(atlas, &refined.hypothesis, &refined.errors, &[], refined.fit.gain),
                 score: refined.score,
