@@ -266,11 +266,17 @@ impl Search<'_> {
     pub(super) fn further<'f>(&self, best: impl Iterator<Item = &'f Found>) -> Vec<Found> {
         /// Share of the best score below which a third effect does not make up for what the first two leave.
         const WORTH: f64 = 0.95;
+        /// Of a third effect: the second one of several that do about the same may stand for it.
+        const BASES_OF_THREE: usize = 2 * BASES;
         let mut starts: Vec<Hypothesis> = Vec::new();
         let bases = of_other_effects(best);
         let score = |found: &Found| found.explanation.score;
         let least = bases.first().map_or(0.0, |first| WORTH * score(first));
-        for base in bases.into_iter().take(BASES).filter(|base| score(base) >= least) {
+        for base in bases
+            .into_iter()
+            .take(BASES_OF_THREE)
+            .filter(|base| score(base) >= least)
+        {
             let left = &base.left;
             self.tell(format_args!("what is beside {}", base.explanation.label()));
             let base = self.trial.base(base.hypothesis.clone());
