@@ -214,7 +214,8 @@ impl Search<'_> {
         /// Data sets whose noise is not the same.
         const DRAWS: [Draws; 2] = [Draws::Sets(0..4), Draws::Sets(4..8)];
         let spec_of = |probe: usize| self.atlas().probes[probe].spec;
-        let left = |further: &[Setting]| self.trial.left_twice(base, further, &DRAWS);
+        let turned = |left: [White; 2]| left.map(|left| self.atlas().turned(&left));
+        let left = |further: &[Setting]| self.trial.left_twice(base, further, &DRAWS).map(turned);
         let (Some(first), Some(left_by_base)) = (screened.first(), left(&[])) else {
             return screened;
         };
@@ -257,7 +258,7 @@ impl Search<'_> {
     }
 
     /// The multiple of a constant effect beside a base that explains most of what that leaves, and what it gains, by what is left
-    /// without it and with it, each by two groups of data sets; it scatters as its path says.
+    /// without it and with it, turned, each by two groups of data sets; it scatters as its path says.
     fn gain_beside(
         &self,
         base: &Base,
@@ -275,16 +276,17 @@ impl Search<'_> {
         .map(|size| path.at(size));
         let in_units_of = |node: &Node, left: &[White; 2]| {
             let deviations = node.widened.map(|widened| (-0.5 * widened).exp());
-            left.each_ref()
-                .map(|left| atlas.turned(left).component_mul(&deviations))
+            left.each_ref().map(|left| left.component_mul(&deviations))
         };
-        let deviance = |node: &Node| {
-            let [one, other] = in_units_of(node, without);
-            one.dot(&other) + node.widened.sum()
-        };
-        let left = in_units_of(&after, without);
-        let (multiple, gain) = explains(&difference(&left, &in_units_of(&after, with)), &left, false);
-        (multiple, gain + 0.5 * (deviance(&before) - deviance(&after)))
+        let deviance = |node: &Node, left: &[White; 2]| left[0].dot(&left[1]) + node.widened.sum();
+        let [without_before, without, with] = [
+            in_units_of(&before, without),
+            in_units_of(&after, without),
+            in_units_of(&after, with),
+        ];
+        let (multiple, gain) = explains(&difference(&without, &with), &without, false);
+        let narrower = deviance(&before, &without_before) - deviance(&after, &without);
+        (multiple, gain + 0.5 * narrower)
     }
 
     /// Effects with those that explain best what each of them leaves, but for those pairs that were tried: actions do not quite add up,

@@ -66,7 +66,9 @@ impl Atlas {
             descended_together: OnceLock::new(),
         };
         let ripple = search.ripple(&Hypothesis::nothing());
-        let alarm = numbers.omnibus_p() < ALARM_P || self.best_score(&residual) > ALARM_SCORE;
+        let mut constant = screened.iter().filter(|s| s.hypothesis.is_constant());
+        let best_constant = constant.next().map_or(0.0, |best| best.score);
+        let alarm = numbers.omnibus_p() < ALARM_P || best_constant > ALARM_SCORE;
         if !alarm && ripple.is_none() {
             return Ok(LapDiagnosis {
                 residual: numbers,

@@ -250,7 +250,8 @@ impl Hypothesis {
 
     /// The shares that data leave, with these errors, of what robots of this kind do, one for each number: their product is the Occam
     /// factor of Laplace's approximation of how probable the data are where only these ranges are known beforehand (Kass and
-    /// Raftery 1995), if these errors have nothing to do with each other. Of sizes by run their mean counts, and no change in time: how far robots change is less known.
+    /// Raftery 1995), if these errors have nothing to do with each other. Of sizes by run their mean counts, and no change in time: how
+    /// far robots change is less known.
     pub(super) fn shares_left(&self, errors: &[(Freedom, f64)], atlas: &Atlas) -> Vec<f64> {
         let moved = errors.iter().filter_map(|(freedom, error)| {
             let part = &self.parts[freedom.part];

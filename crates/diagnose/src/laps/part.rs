@@ -445,14 +445,11 @@ fn middle_s(atlas: &Atlas) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::laps::probe::probes;
-    use crate::laps::testing::simulated;
+    use crate::laps::testing::atlas_of;
 
     #[test]
     fn effects_that_put_a_robot_aside_do_alike() {
-        let mut known = probes(0.032);
-        known.retain(|probe| ["wheel-scale", "axle-length"].contains(&probe.spec.name));
-        let mut atlas = Atlas::with_probes(&simulated, &[], true, known, &|| ()).unwrap();
+        let mut atlas = atlas_of(&["wheel-scale", "axle-length"]);
         let [one, other] = [0, 1].map(|probe| Part::screened(&atlas, probe, Shape::Constant, &[5.0]));
         assert!(atlas.do_alike(&one, &other));
         // The other puts the first run to the other side.

@@ -191,7 +191,7 @@ impl Path {
 }
 
 /// The shares that are allowed of one of a path's pieces, the last of which has such a number.
-pub(super) fn bounds(piece: usize, last: usize) -> [f64; 2] {
+fn bounds(piece: usize, last: usize) -> [f64; 2] {
     let low = if piece == 0 { -BEYOND } else { 0.0 };
     let high = if piece == last { 1.0 + BEYOND } else { 1.0 };
     [low, high]

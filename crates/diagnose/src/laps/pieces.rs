@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 
 use super::atlas::{Atlas, White};
-use super::path::bounds;
+use super::path::{Node, Path};
 
 /// A straight piece of a probe's path.
 pub(super) struct Piece {
@@ -88,13 +88,11 @@ impl Atlas {
     }
 
     fn pieces(&self, probe: usize) -> Vec<Piece> {
-        let nodes = self.nodes(probe);
-        let last = nodes.len().saturating_sub(2);
-        let piece = |(i, pair): (usize, &[(f64, White)])| {
-            let sizes = [pair[0].0, pair[1].0];
-            Piece::new(probe, sizes, bounds(i, last), &pair[0].1, &pair[1].1)
+        let path = Path::of(self.nodes(probe).into_iter());
+        let piece = |([from, to], bounds): ([&Node; 2], [f64; 2])| {
+            Piece::new(probe, [from.size, to.size], bounds, &from.action, &to.action)
         };
-        nodes.windows(2).enumerate().map(piece).collect()
+        path.ways().map(piece).collect()
     }
 }
 

@@ -64,15 +64,6 @@ impl Atlas {
         best_first(all.flatten().collect())
     }
 
-    /// The best constant score over all probes: what the alarm looks at.
-    pub(super) fn best_score(&self, residual: &White) -> f64 {
-        let best = self
-            .ranked_constant(0..self.probes.len(), residual)
-            .into_iter()
-            .next();
-        best.map_or(0.0, |best| best.score.max(0.0))
-    }
-
     /// Some probes of constant size, each at its best, best first.
     pub(super) fn ranked_constant(
         &self,
@@ -233,10 +224,9 @@ impl Target {
 mod tests {
     use super::*;
     use crate::laps::atlas::observed;
-    use crate::laps::probe::probes;
     use crate::laps::spread::Spread;
     use crate::laps::summary::Summary;
-    use crate::laps::testing::{simulated, summaries, twice_as_wide};
+    use crate::laps::testing::{atlas_of, summaries, twice_as_wide};
 
     #[test]
     fn what_follows_is_taken_off() {
@@ -251,9 +241,7 @@ mod tests {
 
     #[test]
     fn what_only_scatters_more_explains_laps_that_do() {
-        let mut known = probes(0.032);
-        known.retain(|probe| ["wheel-scale", "axle-length"].contains(&probe.spec.name));
-        let mut atlas = Atlas::with_probes(&simulated, &[], true, known, &|| ()).unwrap();
+        let mut atlas = atlas_of(&["wheel-scale", "axle-length"]);
         let wide = twice_as_wide(2);
         for departure in atlas.paths[1].iter_mut().flatten() {
             departure.action.fill(0.0);

@@ -266,7 +266,7 @@ impl Search<'_> {
     pub(super) fn further<'f>(&self, best: impl Iterator<Item = &'f Found>) -> Vec<Found> {
         /// Share of the best score below which a third effect does not make up for what the first two leave.
         const WORTH: f64 = 0.95;
-        /// Of a third effect: the second one of several that do about the same may stand for it.
+        /// Pairs beside which a third effect is sought: the second one of several may do about the same and stand for it.
         const BASES_OF_THREE: usize = 2 * BASES;
         let mut starts: Vec<Hypothesis> = Vec::new();
         let bases = of_other_effects(best);

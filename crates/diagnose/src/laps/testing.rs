@@ -51,8 +51,13 @@ pub(super) fn simulated(effects: &[Setting], set: u64, extent: Extent) -> Option
 
 /// An atlas of this robot that knows a wheel scale alone.
 pub(super) fn atlas() -> Atlas {
+    atlas_of(&["wheel-scale"])
+}
+
+/// An atlas of this robot that knows some effects, each of which puts laps aside as a wheel scale does.
+pub(super) fn atlas_of(effects: &[&str]) -> Atlas {
     let mut known = probes(0.032);
-    known.retain(|probe| probe.spec.name == "wheel-scale");
+    known.retain(|probe| effects.contains(&probe.spec.name));
     Atlas::with_probes(&simulated, &[], true, known, &|| ()).expect("it drives its laps")
 }
 

@@ -334,9 +334,8 @@ fn diverse<'n, T>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::laps::probe::probes;
     use crate::laps::spread::Spread;
-    use crate::laps::testing::{simulated, twice_as_wide};
+    use crate::laps::testing::{atlas_of, twice_as_wide};
 
     #[test]
     fn a_strong_effect_leaves_room_for_pairs_without_it() {
@@ -370,9 +369,7 @@ mod tests {
 
     #[test]
     fn pools_tell_of_two_paths_what_all_entries_do() {
-        let mut known = probes(0.032);
-        known.retain(|probe| ["wheel-scale", "axle-length"].contains(&probe.spec.name));
-        let mut atlas = Atlas::with_probes(&simulated, &[], true, known, &|| ()).unwrap();
+        let mut atlas = atlas_of(&["wheel-scale", "axle-length"]);
         let wide = Spread::of(&atlas.axes, &twice_as_wide(2), &atlas.variances);
         for departure in atlas.paths[1].iter_mut().flatten() {
             departure.spread = wide.clone();
