@@ -14,9 +14,9 @@ use super::search::{Found, Search, candidates, of_other_effects, sort};
 use super::tests_of_fit::{ALARM_P, Departures};
 use super::trial::Trial;
 use super::verdict::{
-    ALL_BUT, ALL_BUT_FAULTS, ENOUGH, MOST, goes_over_runs_or_time, hides_what_is_left, is_claimed,
-    is_doubtful, leaves_nothing_to_ask, preferred, stands_alone, suffices, unless_as_good, unless_named,
-    verdict_of, with_first,
+    ALL_BUT, ALL_BUT_FAULTS, ENOUGH, MOST, goes_over_runs_or_time, heaps_noise, hides_what_is_left,
+    is_claimed, is_doubtful, leaves_nothing_to_ask, preferred, stands_alone, suffices, unless_as_good,
+    unless_named, verdict_of, with_first,
 };
 use crate::answer::{ALTERNATIVE, indistinguishable};
 use crate::{Answer, Cause, Error, Explanation, Verdict, Watch};
@@ -229,6 +229,11 @@ fn explain(search: &Search<'_>, mut found: Vec<Found>) -> Vec<Found> {
             .filter(|other| other.explanation.effects.len() == as_many);
         let further = search.further(alike);
         found = preferred(found, further);
+        if !first_is(&found, suffices) {
+            let mut others = search.in_place_of_least(&found);
+            others.retain(|other| !heaps_noise(&other.explanation));
+            found = in_their_places(found, others, search.atlas());
+        }
     }
     // No cause without a name explains what several with theirs explain nearly all of, or one but for the faults of models.
     let nearly_all =
@@ -249,14 +254,19 @@ fn questioned(search: &Search<'_>, found: Vec<Found>) -> Vec<Found> {
 
 /// Explanations with those that are the first but for a bump or patch at the same place of a wall or another kind of slip, and
 /// those near it but for other sensors, in their order.
-fn with_others_alike(search: &Search<'_>, mut found: Vec<Found>) -> Vec<Found> {
+fn with_others_alike(search: &Search<'_>, found: Vec<Found>) -> Vec<Found> {
     if !first_is(&found, is_claimed) {
         return found;
     }
     let mut others = search.otherwise(&found);
     others.extend(search.at_other_sensors(&found));
+    in_their_places(found, others, search.atlas())
+}
+
+/// Explanations with others where these come by their scores among those of as many effects, but for what was found already.
+fn in_their_places(mut found: Vec<Found>, others: Vec<Found>, atlas: &Atlas) -> Vec<Found> {
     for other in others {
-        if (found.iter()).any(|known| known.hypothesis.is_near(&other.hypothesis, search.atlas())) {
+        if (found.iter()).any(|known| known.hypothesis.is_near(&other.hypothesis, atlas)) {
             continue;
         }
         let score = other.explanation.score;

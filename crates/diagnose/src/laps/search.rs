@@ -286,6 +286,28 @@ impl Search<'_> {
         self.settle(self.descend_several(&starts, &ROUNDS_BESIDE, f64::NEG_INFINITY))
     }
 
+    /// The first of some explanations, if it has three effects, with others in place of the constant one that acts least: those that
+    /// go best with the other two, tried to the end. That one was found beside a pair of which one effect was given up since.
+    pub(super) fn in_place_of_least(&self, found: &[Found]) -> Vec<Found> {
+        let Some(best) = found.first().filter(|best| best.hypothesis.parts.len() == 3) else {
+            return Vec::new();
+        };
+        let hypothesis = &best.hypothesis;
+        let weight = |&part: &usize| hypothesis.weight(part, self.atlas());
+        let least = (0..hypothesis.parts.len())
+            .filter(|&part| hypothesis.parts[part].shape == Shape::Constant)
+            .min_by(|a, b| weight(a).total_cmp(&weight(b)));
+        let Some(rest) = least.map(|least| hypothesis.without(least)) else {
+            return Vec::new();
+        };
+        let Some(left) = self.left_by(&rest) else {
+            return Vec::new();
+        };
+        let base = self.trial.base(rest);
+        let starts = self.beside(&base, &left, std::slice::from_ref(hypothesis));
+        self.settle(self.descend_several(&starts, &ROUNDS_BESIDE, f64::NEG_INFINITY))
+    }
+
     /// Descends from hypotheses of several effects; the best one is tried without its patterns too, one of them or all, and with
     /// its pattern given to another of its effects: what another effect left may have suggested it.
     pub(super) fn descend_several(

@@ -117,7 +117,7 @@ pub(super) fn verdict_of(best: &Explanation) -> Verdict {
 }
 
 /// Whether an explanation needs several effects on noise: they are more likely one that has no name.
-fn heaps_noise(explanation: &Explanation) -> bool {
+pub(super) fn heaps_noise(explanation: &Explanation) -> bool {
     noises(explanation) > 1
 }
 
