@@ -79,6 +79,15 @@ impl Explanation {
         self.effects.iter().any(|effect| *effect.setting.spec == UNLISTED)
     }
 
+    /// Whether data speak for another explanation by more effects: each further number gains five units of log-likelihood, and all of
+    /// them more than the faults of models do.
+    pub(crate) fn lacks_as(&self, other: &Self) -> bool {
+        let numbers = other.fitted().saturating_sub(self.fitted()).max(1);
+        other.effects.len() > self.effects.len()
+            && !other.has_no_name()
+            && other.gain - self.gain >= (ALTERNATIVE * numbers as f64).max(self.faults())
+    }
+
     /// Share of what exceeds the declared model's expectation that it explains, in [0, 1]; `None` where laps alone tell it and that
     /// much of how they depart is often chance, of which nothing is a share.
     pub fn explained(&self, of_laps: Option<&Departures>) -> Option<f64> {
@@ -193,20 +202,14 @@ impl Answer {
         }
     }
 
-    /// Explanations by more effects than are claimed, for which these data speak, but not enough: each further number gains five units
-    /// of log-likelihood, and all of them more than the faults of models do. Those within five units of the best of these, best first.
+    /// Explanations by more effects than are claimed, for which these data speak, but not enough: those within five units of the best of
+    /// these, best first.
     pub fn further(&self) -> Vec<&Explanation> {
         let Some(claimed) = self.claimed().filter(|claimed| !claimed.has_no_name()) else {
             return Vec::new();
         };
-        let least = |numbers: usize| (ALTERNATIVE * numbers as f64).max(claimed.faults());
-        let speaks_for = |other: &&Explanation| {
-            let numbers = other.fitted().saturating_sub(claimed.fitted()).max(1);
-            other.effects.len() > claimed.effects.len()
-                && !other.has_no_name()
-                && other.gain - claimed.gain >= least(numbers)
-        };
-        let mut further: Vec<&Explanation> = self.explanations.iter().filter(speaks_for).collect();
+        let explanations = self.explanations.iter();
+        let mut further: Vec<&Explanation> = explanations.filter(|other| claimed.lacks_as(other)).collect();
         further.sort_by(|a, b| b.score.total_cmp(&a.score));
         let best = further.first().map_or(f64::INFINITY, |best| best.score);
         further.retain(|other| other.score >= best - ALTERNATIVE);

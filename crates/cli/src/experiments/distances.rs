@@ -33,6 +33,31 @@ pub(crate) struct Distances {
 }
 
 impl Distances {
+    /// Simulations by key, name and the paper's line; those without a distance to every run (eq. 8) are left out.
+    pub(super) fn beside_paper(
+        title: &str,
+        runs: Vec<String>,
+        simulations: impl IntoIterator<Item = (String, &'static str, published::Row)>,
+        distance: &DistanceOf<'_>,
+    ) -> Self {
+        let row = |(place, (key, name, paper)): (usize, (String, &str, published::Row))| {
+            let here = (0..runs.len())
+                .map(|run| distance(run, place))
+                .collect::<Option<_>>()?;
+            Some(Row {
+                key,
+                name: name.into(),
+                paper: Some(paper),
+                here,
+            })
+        };
+        Self {
+            title: title.into(),
+            rows: simulations.into_iter().enumerate().filter_map(row).collect(),
+            runs,
+        }
+    }
+
     /// The paper's line and ours for each simulation.
     pub(crate) fn table(&self) -> Table {
         self.beside(&self.title, "here", &[])

@@ -5,9 +5,9 @@ use chart::{Axis, Color, Dash, Figure, Fill, Mark, Marker, Panel, Shape, Side, S
 use sim::Response;
 
 use super::comparison::{Comparison, Space};
-use super::distances::{DistanceOf, Distances, Row};
+use super::distances::{DistanceOf, Distances};
 use super::outcome::{Block, Claim, Outcome, Picture, Section};
-use super::published::{self, IMPROVED, ORIGINAL, SENSOR_PAIRS};
+use super::published::{IMPROVED, ORIGINAL, SENSOR_PAIRS};
 use super::study::{Study, Variant};
 use crate::figures::{self, Shown, line, map, measured, paths, simulated, single, walls};
 use crate::setup;
@@ -70,27 +70,18 @@ pub(crate) fn outcome(study: &Study) -> Result<Outcome> {
     })
 }
 
-/// Table II beside the paper's; simulations without a distance to every run (eq. 8) are left out.
+/// Table II beside the paper's.
 pub(super) fn table_ii(study: &Study, distance: &DistanceOf<'_>) -> Distances {
-    let row = |(place, (key, paper)): (usize, (&str, published::Row))| {
-        Some(Row {
-            key: String::from(key),
-            name: NAMES[place].into(),
-            paper: Some(paper),
-            here: (0..study.real.len())
-                .map(|run| distance(run, place))
-                .collect::<Option<_>>()?,
-        })
-    };
-    Distances {
-        title: "Table II: distances of the simulations to the measured runs".into(),
-        runs: study.runs(),
-        rows: [("improved", IMPROVED), ("original", ORIGINAL)]
-            .into_iter()
-            .enumerate()
-            .filter_map(row)
-            .collect(),
-    }
+    let [improved, original] = NAMES;
+    Distances::beside_paper(
+        "Table II: distances of the simulations to the measured runs",
+        study.runs(),
+        [
+            ("improved".into(), improved, IMPROVED),
+            ("original".into(), original, ORIGINAL),
+        ],
+        distance,
+    )
 }
 
 fn claims(study: &Study, comparison: &Comparison, distances: &Distances) -> Vec<Claim> {

@@ -5,7 +5,7 @@ use chart::{Color, Dash, Figure, Panel, Side, Style};
 use serde_json::{Map, Value, json};
 
 use super::comparison::{Comparison, Space};
-use super::distances::{DistanceOf, Distances, Row};
+use super::distances::{DistanceOf, Distances};
 use super::estimate::{Estimate, Tally};
 use super::mean_lap::Difference;
 use super::outcome::{Block, Claim, Outcome, Picture, Section};
@@ -69,23 +69,17 @@ pub(crate) fn outcome(study: &Study) -> Result<Outcome> {
     })
 }
 
-/// Table III beside the paper's; simulations without a distance to every run (eq. 8) are left out.
+/// Table III beside the paper's.
 pub(super) fn table_iii(study: &Study, distance: &DistanceOf<'_>) -> Distances {
-    let row = |(place, (error_m, paper, _)): (usize, (f64, published::Row, usize))| {
-        Some(Row {
-            key: error_m.to_string(),
-            name: NAMES[place].into(),
-            paper: Some(paper),
-            here: (0..study.real.len())
-                .map(|run| distance(run, place))
-                .collect::<Option<_>>()?,
-        })
+    let wall = |((error_m, paper, _), name): ((f64, published::Row, usize), &'static str)| {
+        (error_m.to_string(), name, paper)
     };
-    Distances {
-        title: "Table III: distances of the simulations to the measured runs".into(),
-        runs: study.runs(),
-        rows: WALLS.into_iter().enumerate().filter_map(row).collect(),
-    }
+    Distances::beside_paper(
+        "Table III: distances of the simulations to the measured runs",
+        study.runs(),
+        WALLS.into_iter().zip(NAMES).map(wall),
+        distance,
+    )
 }
 
 fn claims(study: &Study, comparison: &Comparison) -> Vec<Claim> {

@@ -20,22 +20,46 @@ use super::trial::Trial;
 #[derive(Debug, Clone)]
 pub(super) struct Base {
     pub(super) hypothesis: Hypothesis,
-    /// How the base's recordings scatter, from which what is sought has to stand out, if it explains nearly all: as well as many data
-    /// sets tell it.
-    scatter: Option<Vec<Scatter>>,
-    /// How much more it scatters than in these units, as logarithms of variances of a turned data set's entries.
-    widened: Option<White>,
-    /// What its numbers do, as orthonormal directions in units of its scatter: they follow the other effect. None if they stay.
+    units: Units,
+    /// What its numbers do, as orthonormal directions in these units: they follow the other effect. None if they stay.
     following: Vec<White>,
+}
+
+/// In units of which scatter what is left beside a hypothesis has to stand out.
+#[derive(Debug, Clone)]
+enum Units {
+    /// The declared model's.
+    Declared,
+    /// The declared model's, whose entries turned have variances with such logarithms: how the hypothesis' recordings scatter, as a few
+    /// data sets tell it.
+    Widened(White),
+    /// The hypothesis' own, as well as many data sets tell it.
+    Own(Vec<Scatter>),
+}
+
+impl Units {
+    fn scatter<'a>(&'a self, atlas: &'a Atlas) -> &'a [Scatter] {
+        match self {
+            Self::Own(own) => own,
+            Self::Declared | Self::Widened(_) => &atlas.scatter,
+        }
+    }
+
+    /// How much more there is than in this scatter.
+    fn widened(&self) -> Option<&White> {
+        match self {
+            Self::Widened(widened) => Some(widened),
+            Self::Declared | Self::Own(_) => None,
+        }
+    }
 }
 
 impl Base {
     /// The same in units of another scatter, if there is one.
     pub(super) fn in_units_of(self, scatter: Option<Vec<Scatter>>) -> Self {
         match scatter {
-            Some(_) => Self {
-                scatter,
-                widened: None,
+            Some(scatter) => Self {
+                units: Units::Own(scatter),
                 ..self
             },
             None => self,
@@ -52,8 +76,7 @@ impl Trial<'_> {
     /// A hypothesis whose numbers follow an effect beside it, in units of the declared model's scatter.
     pub(super) fn following(&self, hypothesis: Hypothesis) -> Base {
         Base {
-            scatter: None,
-            widened: None,
+            units: Units::Declared,
             following: self.directions(&hypothesis, &self.atlas.scatter),
             hypothesis,
         }
@@ -61,24 +84,30 @@ impl Trial<'_> {
 
     /// A hypothesis whose numbers follow an effect beside it, in units of its own scatter if it explains nearly all.
     pub(super) fn base(&self, hypothesis: Hypothesis) -> Base {
+        let units = self.units_of(&hypothesis).unwrap_or(Units::Declared);
+        Base {
+            following: self.directions(&hypothesis, units.scatter(self.atlas)),
+            hypothesis,
+            units,
+        }
+    }
+
+    /// Units of what is left beside a hypothesis; `None` where the robot crashes.
+    fn units_of(&self, hypothesis: &Hypothesis) -> Option<Units> {
         const SETS: u64 = 10;
         const NEARLY_ALL: f64 = 0.95;
-        let evaluated = self.evaluate(&hypothesis, SETS);
-        let scatter = evaluated.as_ref().and_then(|evaluated| {
-            let own = self.atlas.scatter_of(evaluated.summaries.iter(), 1)?;
-            let square = |from: &Expectation| white(&own, &self.atlas.layout, self.data, from).norm_squared();
-            let excess = |from: &Expectation| square(from) - self.atlas.layout.len() as f64;
-            let left = excess(&evaluated.expectation);
-            (left < (1.0 - NEARLY_ALL) * excess(&self.atlas.null)).then_some(own)
+        let evaluated = self.evaluate(hypothesis, SETS)?;
+        let excess = |scatter: &[Scatter], from: &Expectation| {
+            let left = white(scatter, &self.atlas.layout, self.data, from);
+            left.norm_squared() - self.atlas.layout.len() as f64
+        };
+        let own = (self.atlas.scatter_of(evaluated.summaries.iter(), 1)).filter(|own| {
+            excess(own, &evaluated.expectation) < (1.0 - NEARLY_ALL) * excess(own, &self.atlas.null)
         });
-        let wider = evaluated.filter(|_| scatter.is_none());
-        let units = scatter.as_ref().unwrap_or(&self.atlas.scatter);
-        Base {
-            following: self.directions(&hypothesis, units),
-            hypothesis,
-            scatter,
-            widened: wider.map(|evaluated| self.atlas.widened(&evaluated.summaries)),
-        }
+        Some(match own {
+            Some(own) => Units::Own(own),
+            None => Units::Widened(self.atlas.widened(&evaluated.summaries)),
+        })
     }
 
     /// What the numbers of a hypothesis do, as orthonormal directions in units of a scatter.
@@ -105,7 +134,7 @@ impl Trial<'_> {
 
     /// What an expectation leaves of the data, in units of a base's scatter, but for what the base's numbers can follow.
     pub(super) fn left_beyond(&self, base: &Base, expected: &Expectation) -> White {
-        let scatter = base.scatter.as_ref().unwrap_or(&self.atlas.scatter);
+        let scatter = base.units.scatter(self.atlas);
         let left = white(scatter, &self.atlas.layout, self.data, expected);
         self.without_silent(base.beyond(self.without_silent(left)))
     }
@@ -143,8 +172,7 @@ impl Atlas {
     pub(super) fn at_rest(&self, hypothesis: Hypothesis) -> Base {
         Base {
             hypothesis,
-            scatter: None,
-            widened: None,
+            units: Units::Declared,
             following: Vec::new(),
         }
     }
@@ -153,14 +181,14 @@ impl Atlas {
     /// follow, best first. What is left is given in units of the declared model's scatter.
     fn screen_beside(&self, base: &Base, left: &White) -> Vec<Screened> {
         let beyond = |white: &White| self.beyond(base, white);
-        self.screen_by(&beyond(left), beyond, base.widened.as_ref())
+        self.screen_by(&beyond(left), beyond, base.units.widened())
     }
 
     /// A vector in units of the declared model's scatter in those of a base's, but for what the base's numbers can follow.
     pub(super) fn beyond(&self, base: &Base, white: &White) -> White {
-        base.beyond(match &base.scatter {
-            Some(own) => in_other_units(white, &self.layout, &self.scatter, own),
-            None => white.clone(),
+        base.beyond(match &base.units {
+            Units::Own(own) => in_other_units(white, &self.layout, &self.scatter, own),
+            Units::Declared | Units::Widened(_) => white.clone(),
         })
     }
 }
@@ -182,12 +210,20 @@ impl Search<'_> {
         tried: &[Hypothesis],
     ) -> Vec<Hypothesis> {
         const FURTHER: usize = 3;
-        /// The same of a weak signal, of which what was heard tells less.
-        const FURTHER_OF_WEAK: usize = 5;
+        /// The same where more are about as good as the best, or of a weak signal, of which what was heard tells less.
+        const MOST: usize = 5;
+        /// Log-likelihood by which what was heard may be behind and turn out as good.
+        const NEAR: f64 = 10.0;
         let gain = 0.5 * (self.residual.norm_squared() - left.norm_squared());
-        let further = if gain < WEAK { FURTHER_OF_WEAK } else { FURTHER };
+        let shortlist = self.shortlist(heard);
+        let near = |other: &&&Screened| other.score > shortlist[0].score - NEAR;
+        let further = if gain < WEAK {
+            MOST
+        } else {
+            shortlist.iter().filter(near).count().clamp(FURTHER, MOST)
+        };
         let start = &base.hypothesis;
-        (self.shortlist(heard).into_iter())
+        (shortlist.iter())
             .map(|other| (other.score, start.with(&other.hypothesis)))
             // A pattern may cost more than all that a further effect gains.
             .filter(|(score, pair)| pair.worth(gain + score) > start.worth(gain))
@@ -268,7 +304,7 @@ impl Search<'_> {
     ) -> (f64, f64) {
         let atlas = self.atlas();
         let probe = constant.probe();
-        let path = atlas.path(probe, &atlas.nodes(probe), base.widened.as_ref());
+        let path = atlas.path(probe, &atlas.nodes(probe), base.units.widened());
         let [before, after] = [
             atlas.probes[probe].neutral,
             constant.hypothesis.parts[0].mean_size(atlas),

@@ -252,13 +252,18 @@ fn questioned(search: &Search<'_>, found: Vec<Found>) -> Vec<Found> {
     held_still(search, with_others_alike(search, simplified(search, found)))
 }
 
-/// Explanations with those that are the first but for a bump or patch at the same place of a wall or another kind of slip, and
-/// those near it but for other sensors, in their order.
+/// Explanations with those that are the first, or what may be there besides, but for a bump or patch at the same place of a wall or
+/// another kind of slip, and those near the first but for other sensors, in their order.
 fn with_others_alike(search: &Search<'_>, found: Vec<Found>) -> Vec<Found> {
-    if !first_is(&found, is_claimed) {
+    let Some(first) = found.first().filter(|first| is_claimed(&first.explanation)) else {
         return found;
-    }
-    let mut others = search.otherwise(&found);
+    };
+    let mut others = search.otherwise(first, &found);
+    let further = found
+        .iter()
+        .filter(|other| first.explanation.lacks_as(&other.explanation));
+    let further = further.max_by(|a, b| a.explanation.score.total_cmp(&b.explanation.score));
+    others.extend(further.map_or_else(Vec::new, |further| search.otherwise(further, &found)));
     others.extend(search.at_other_sensors(&found));
     in_their_places(found, others, search.atlas())
 }

@@ -158,13 +158,10 @@ impl Search<'_> {
         self.settle(self.descend(starts.iter(), &ROUNDS_FROM_NEAR, f64::NEG_INFINITY))
     }
 
-    /// The first of some explanations with a patch of a wall in place of a bump or the other way round, and with slip of the other kind,
+    /// One of some explanations with a patch of a wall in place of a bump or the other way round, and with slip of the other kind,
     /// tried to the end unless it is among them: places were screened at a coarse grid, and of slip by the noise of paths.
-    pub(super) fn otherwise(&self, found: &[Found]) -> Vec<Found> {
-        let Some(best) = found.first() else {
-            return Vec::new();
-        };
-        let hypothesis = &best.hypothesis;
+    pub(super) fn otherwise(&self, one: &Found, found: &[Found]) -> Vec<Found> {
+        let hypothesis = &one.hypothesis;
         let exchanged = |i: usize| {
             let part = &hypothesis.parts[i];
             let others = part.at_same_place(self.atlas()).into_iter();

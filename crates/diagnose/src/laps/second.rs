@@ -60,6 +60,10 @@ impl Search<'_> {
                         if !ends.iter().any(is_worth_it) {
                             return ends;
                         }
+                        // What leaves so little that something else makes up for it may be a rounding.
+                        if !jumps {
+                            self.descend_on(&mut tried, self.jumping_beside(found.iter().take(1)));
+                        }
                     }
                 }
             }
