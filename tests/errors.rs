@@ -295,7 +295,7 @@ fn runs_that_cannot_be_read() {
     let rectangle = "give every row as many, empty where a value is missing";
     let missing = "leave the field empty if it is missing";
     let blind = "0 whole laps, and the first is not analysed: at least two are needed, and four to trace; check the world, the driving \
-                 direction ([declared] run.direction in dataset.toml) and the unit of x_m and y_m";
+                 direction (clockwise; [declared] run.direction in dataset.toml) and the unit of x_m and y_m";
     for (run, message) in [
         ("t_s,x_m\n0,1\n", "run_a.csv:1: column y_m is missing; there are: t_s, x_m".to_owned()),
         ("t_s;x_m;y_m\n0;1;1\n", "run_a.csv:1: `t_s;x_m;y_m` is one column; separate columns by commas".to_owned()),

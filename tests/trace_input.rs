@@ -203,7 +203,7 @@ fn positions_in_millimetres_are_refused() {
     scratch.refuses(
         &["trace", "roduit2007", "--measured", "set", "--out", "out", "--no-cache", "--quiet"],
         "set/run_a.csv: 0 whole laps, and the first is not analysed: at least two are needed, and four to trace; check the world, the \
-         driving direction ([declared] run.direction in dataset.toml) and the unit of x_m and y_m",
+         driving direction (clockwise; [declared] run.direction in dataset.toml) and the unit of x_m and y_m",
     );
 }
 

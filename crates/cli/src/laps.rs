@@ -6,7 +6,7 @@ use anyhow::{Context, Result, bail};
 use pdm::Cluster;
 use rayon::prelude::*;
 use sim::{Circuit, Drive, Start, Vec2};
-use track::{Lap, LapTracker, Way};
+use track::{Lap, LapTracker};
 
 use crate::config::Config;
 use crate::dataset::{DataSet, RunFile};
@@ -149,17 +149,17 @@ pub(crate) struct Measured {
 }
 
 impl Measured {
-    /// The laps of a data set on a circuit that is at hand. Sightings where no robot can be are taken for none.
+    /// The laps of a data set on a circuit that is at hand, driven as it declares over a model. Sightings where no robot can be are
+    /// taken for none.
     ///
     /// # Errors
     /// A run without a whole lap after its first.
-    pub(crate) fn on(mut set: DataSet, circuit: Arc<Circuit>) -> Result<Self> {
-        let config = set.declared_config(&Config::shipped())?;
-        let way = setup::way(&config, &circuit.course);
+    pub(crate) fn on(mut set: DataSet, circuit: Arc<Circuit>, model: &Config) -> Result<Self> {
+        let config = set.declared_config(model)?;
         let strays: Vec<Vec<String>> = set.runs.iter_mut().map(without_strays).collect();
         let sampled: Vec<Result<SampledRun>> = (set.runs.par_iter().zip(strays))
             .map(|(run, strays)| {
-                let sampled = sample(&set, run, &circuit, way)?;
+                let sampled = sample(&set, run, &circuit, &config)?;
                 Ok(SampledRun { strays, ..sampled })
             })
             .collect();
@@ -197,8 +197,8 @@ fn seen(run: &RunFile) -> impl Iterator<Item = (f64, Vec2)> {
     rows.filter_map(|(time_s, position)| position.map(|[x, y]| (time_s, Vec2::new(x, y))))
 }
 
-fn sample(set: &DataSet, run: &RunFile, circuit: &Circuit, way: Way) -> Result<SampledRun> {
-    let mut tracker = LapTracker::new(&circuit.gates, way);
+fn sample(set: &DataSet, run: &RunFile, circuit: &Circuit, config: &Config) -> Result<SampledRun> {
+    let mut tracker = LapTracker::new(&circuit.gates, setup::way(config, &circuit.course));
     let whole: Vec<Lap> = seen(run)
         .filter_map(|(time_s, position)| tracker.push(time_s, position))
         .collect();
@@ -218,9 +218,10 @@ fn sample(set: &DataSet, run: &RunFile, circuit: &Circuit, way: Way) -> Result<S
         }
         bail!(
             "{path}: {} whole lap{}, and the first is not analysed: at least two are needed, and four to trace; check the world, the \
-             driving direction ([declared] run.direction in dataset.toml) and the unit of x_m and y_m",
+             driving direction ({}; [declared] run.direction in dataset.toml) and the unit of x_m and y_m",
             whole.len(),
-            if whole.len() == 1 { "" } else { "s" }
+            if whole.len() == 1 { "" } else { "s" },
+            config.run.direction.name()
         );
     }
     Ok(sampled)

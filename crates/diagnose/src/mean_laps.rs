@@ -12,6 +12,8 @@ pub struct MeanLaps {
     lap_s: f64,
     /// Runs x laps x gates.
     runs_m: Vec<Vec<Vec<f64>>>,
+    /// Runs x laps.
+    runs_s: Vec<Vec<f64>>,
 }
 
 impl MeanLaps {
@@ -29,18 +31,29 @@ impl MeanLaps {
             completing: whole.len(),
             runs: runs.len(),
         })?;
-        let times_s: Vec<f64> = whole.iter().flatten().map(|lap| lap.duration_s()).collect();
+        let lap_times_s = |laps: &Vec<&Lap>| laps.iter().map(|lap| lap.duration_s()).collect();
+        let runs_s: Vec<Vec<f64>> = whole.iter().map(lap_times_s).collect();
         let offsets_m = |laps: &Vec<&Lap>| laps.iter().map(|lap| lap.offsets_m.clone()).collect();
         Ok(Self {
             mean_m,
-            lap_s: times_s.iter().sum::<f64>() / times_s.len() as f64,
+            lap_s: mean(runs_s.iter().flatten()),
             runs_m: whole.iter().map(offsets_m).collect(),
+            runs_s,
         })
     }
 
     /// Mean lap time, s.
     pub fn lap_s(&self) -> f64 {
         self.lap_s
+    }
+
+    /// Standard deviation of the mean lap time of a run of so many laps that this very model drove, s.
+    pub fn lap_chance_s(&self, laps: usize) -> f64 {
+        let mean_of = |run: &Vec<f64>| mean(run.iter().take(laps));
+        let means: Vec<f64> = self.runs_s.iter().map(mean_of).collect();
+        let middle = mean(&means);
+        let squares: f64 = means.iter().map(|run| (run - middle).powi(2)).sum();
+        (squares / (means.len() as f64 - 1.0)).sqrt()
     }
 
     /// The mean of all laps, gate by gate, m.
@@ -98,6 +111,11 @@ pub fn mean_lap<'a>(laps: impl IntoIterator<Item = &'a Vec<f64>>) -> Option<Vec<
     (count > 0.0).then(|| sum.into_iter().map(|s: f64| s / count).collect())
 }
 
+fn mean<'a>(values: impl IntoIterator<Item = &'a f64>) -> f64 {
+    let (sum, count) = (values.into_iter()).fold((0.0, 0.0), |(sum, count), x| (sum + x, count + 1.0));
+    sum / count
+}
+
 fn rms(a: &[f64], b: &[f64]) -> f64 {
     (a.iter().zip(b).map(|(x, y)| (x - y) * (x - y)).sum::<f64>() / a.len() as f64).sqrt()
 }
@@ -135,6 +153,19 @@ mod tests {
         let expected = ((0.3_f64.powi(2) + 0.1_f64.powi(2)) / 2.0).sqrt();
         assert!((laps.distance_m(&run) - expected).abs() < 1e-12);
         assert!(laps.distance_m(&[]).is_nan());
+    }
+
+    #[test]
+    fn lap_times_scatter_as_the_means_of_runs_do() {
+        let of = |duration_s: f64| Lap {
+            end_s: 10.0 + duration_s,
+            ..lap(vec![0.0])
+        };
+        let runs = [vec![of(69.0), of(71.0), of(90.0)], vec![of(72.0), of(76.0)]];
+        let laps = MeanLaps::new(&runs).unwrap();
+        assert!((laps.lap_s() - 75.6).abs() < 1e-12);
+        // Means of 70 and 74 s of the first two laps.
+        assert!((laps.lap_chance_s(2) - 8.0_f64.sqrt()).abs() < 1e-12);
     }
 
     #[test]

@@ -122,7 +122,7 @@ fn data_sets(session: &Session, args: &Compare) -> Result<Clusters> {
                 args.data[0].display()
             );
         }
-        let measured = Measured::on(set, Arc::clone(&circuits[&key]))?;
+        let measured = Measured::on(set, Arc::clone(&circuits[&key]), &Config::shipped())?;
         measured
             .runs
             .iter()

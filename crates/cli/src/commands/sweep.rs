@@ -87,7 +87,7 @@ impl Sweep {
             runs: args.runs as usize,
         };
         let grid = Grid::new(&base, &args.vary)?;
-        let measured = Measured::on(set, circuit)?;
+        let measured = Measured::on(set, circuit, &file.config)?;
         measured
             .runs
             .iter()

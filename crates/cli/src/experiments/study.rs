@@ -156,7 +156,7 @@ impl Measurements {
         let (braitenberg, rule_based) = (of(ControllerKind::Braitenberg)?, of(ControllerKind::RuleBased)?);
         let (circuit, world) = circuit(&braitenberg, &rule_based)?;
         let measured = |set: DataSet| -> Result<Measured> {
-            let measured = Measured::on(set, Arc::clone(&circuit))?;
+            let measured = Measured::on(set, Arc::clone(&circuit), &Config::shipped())?;
             let (folder, runs) = (measured.set.folder.display(), measured.runs.len());
             ensure!(
                 runs >= 2,

@@ -6,7 +6,7 @@ use sim::Pattern;
 
 use super::Trace;
 use super::answer::{FromLogs, rivals};
-use super::errors::{Eq8, Errors, Starts};
+use super::errors::{Eq8, Errors, LapTimes, Starts};
 use super::limits::CHANNELS;
 use super::next::Experiment;
 
@@ -102,11 +102,17 @@ fn quadratic(q: &Quadratic) -> Value {
 
 /// Lap times, and eq. 8 in some modes, before and after.
 fn laps(errors: &Errors) -> Value {
-    let [before_s, after_s] = errors.simulated_lap_s();
-    let eq_8 = |eq_8: Eq8| json!({ "modes": eq_8.modes, "before": eq_8.before, "after": eq_8.after });
+    let LapTimes {
+        measured_s,
+        before_s,
+        after_s,
+        chance_s,
+    } = errors.lap_times;
+    let eq_8 =
+        |of: Eq8| json!({ "modes": of.modes, "before": of.before, "after": of.after, "chance": of.chance });
     json!({
-        "lap_time_s": { "measured": errors.measured_lap_s(), "before": before_s, "after": after_s },
-        "eq_8": errors.eq_8().map(eq_8),
+        "lap_time_s": { "measured": measured_s, "before": before_s, "after": after_s, "chance": chance_s },
+        "eq_8": errors.eq_8.map(eq_8),
     })
 }
 

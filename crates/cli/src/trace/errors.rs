@@ -38,32 +38,21 @@ pub(crate) struct Errors {
     pub(crate) after_m: Vec<f64>,
     /// What it is for runs of the model with the effects, m.
     pub(crate) floor_m: Vec<f64>,
+    pub(crate) lap_times: LapTimes,
+    /// Eq. 8 between the laps simulated for each held-out run and the measured ones, in [`EQ_8_MODES`].
+    pub(crate) eq_8: [Eq8; 2],
     /// How runs start, if that is known.
     pub(crate) starts: Option<Starts>,
 }
 
-impl Errors {
-    /// Mean lap time of the held-out laps, s.
-    pub(crate) fn measured_lap_s(&self) -> f64 {
-        let times_s: Vec<f64> = self.held_out.iter().flat_map(SampledRun::lap_times_s).collect();
-        times_s.iter().sum::<f64>() / times_s.len() as f64
-    }
-
-    /// Mean lap times of the simulation before and after, s.
-    pub(crate) fn simulated_lap_s(&self) -> [f64; 2] {
-        [self.before.lap_s(), self.after.lap_s()]
-    }
-
-    /// Eq. 8 between the simulated laps before and after and all held-out ones.
-    pub(crate) fn eq_8(&self) -> [Eq8; 2] {
-        let measured: Vec<Vec<f64>> = self.held_out.iter().flat_map(SampledRun::offsets_m).collect();
-        let [before, after] = [&self.before, &self.after].map(|laps| eq_8(laps, &measured));
-        [0, 1].map(|i| Eq8 {
-            modes: EQ_8_MODES[i],
-            before: before[i],
-            after: after[i],
-        })
-    }
+/// Mean lap times of held-out runs and of what is simulated for each of them, s.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct LapTimes {
+    pub(crate) measured_s: f64,
+    pub(crate) before_s: f64,
+    pub(crate) after_s: f64,
+    /// Standard deviation by chance.
+    pub(crate) chance_s: f64,
 }
 
 /// Eq. 8 in some modes of a PDM of simulated and measured laps; `None` of laps that have not so many.
@@ -72,6 +61,8 @@ pub(crate) struct Eq8 {
     pub(crate) modes: usize,
     pub(crate) before: Option<f64>,
     pub(crate) after: Option<f64>,
+    /// What it is between as many simulated laps and others.
+    pub(crate) chance: Option<f64>,
 }
 
 /// How runs start on average.
@@ -133,16 +124,21 @@ impl Judged<'_> {
             })
         };
         let all = simulated(None)?;
-        let mut distances_m = Vec::new();
-        for (run, unseen) in held_out.runs.iter().zip(&held_out.unseen) {
+        let mut beside = Vec::new();
+        for unseen in &held_out.unseen {
             let own = (!unseen.is_nothing())
                 .then(|| simulated(Some(unseen)))
                 .transpose()?;
-            let [before, after] = own.as_ref().unwrap_or(&all);
-            distances_m.push(distances(run, before, after, after));
+            let [before, after] =
+                own.map_or_else(|| all.each_ref().map(Cow::Borrowed), |own| own.map(Cow::Owned));
+            beside.push(Beside {
+                of_chance: after.clone(),
+                before,
+                after,
+            });
         }
         let starts = self.starts(&held_out.beginnings)?;
-        Ok(self.errors(all, held_out.runs, &distances_m, starts))
+        Ok(self.errors(&all, held_out.runs, &beside, starts))
     }
 
     /// The errors on each measured run, of sizes that were fitted to the others.
@@ -154,8 +150,8 @@ impl Judged<'_> {
         let runs = &recording.measured.runs;
         let all = self.before_and_after(|effects| simulated(effects, 0..runs.len()))?;
         let [before, after] = &all;
-        let mut distances_m = Vec::new();
-        for (at, run) in runs.iter().enumerate() {
+        let mut beside = Vec::new();
+        for at in 0..runs.len() {
             let alone = |effects| anyhow::Ok(Cow::Owned(simulated(effects, at..at + 1)?));
             let own_before = if recording.expects_the_same_of_runs() {
                 Cow::Borrowed(before)
@@ -170,14 +166,18 @@ impl Judged<'_> {
             };
             // Where each run is expected for itself, chance is what is left about that.
             let of_chance = if recording.expects_the_same_of_runs() {
-                after
+                Cow::Borrowed(after)
             } else {
-                &own_after
+                own_after.clone()
             };
-            distances_m.push(distances(run, &own_before, &own_after, of_chance));
+            beside.push(Beside {
+                before: own_before,
+                after: own_after,
+                of_chance,
+            });
         }
         let starts = self.starts(&recording.beginnings)?;
-        Ok(self.errors(all, runs.clone(), &distances_m, starts))
+        Ok(self.errors(&all, runs.clone(), &beside, starts))
     }
 
     /// The mean laps of the declared model and of that with the answer's effects, if it has any.
@@ -199,20 +199,26 @@ impl Judged<'_> {
 
     fn errors(
         &self,
-        [before, after]: [MeanLaps; 2],
+        [before, after]: &[MeanLaps; 2],
         held_out: Vec<SampledRun>,
-        distances_m: &[[f64; 3]],
+        beside: &[Beside<'_>],
         starts: Option<Starts>,
     ) -> Errors {
-        let of = |which: usize| distances_m.iter().map(|run| run[which]).collect();
+        let laps_m: Vec<Vec<Vec<f64>>> = held_out.iter().map(SampledRun::offsets_m).collect();
+        let of_each = |distance_m: fn(&Beside<'_>, &Vec<Vec<f64>>) -> f64| {
+            let runs = beside.iter().zip(&laps_m);
+            runs.map(|(beside, run)| distance_m(beside, run)).collect()
+        };
         Errors {
             recording: self.place,
+            before: before.clone(),
+            after: after.clone(),
+            before_m: of_each(|beside, run| beside.before.distance_m(run)),
+            after_m: of_each(|beside, run| beside.after.distance_m(run)),
+            floor_m: of_each(|beside, run| beside.of_chance.floor_m(run.len())),
+            lap_times: LapTimes::of(&held_out, beside),
+            eq_8: eq_8(&laps_m, beside),
             held_out,
-            before,
-            after,
-            before_m: of(0),
-            after_m: of(1),
-            floor_m: of(2),
             starts,
         }
     }
@@ -238,32 +244,92 @@ impl Judged<'_> {
     }
 }
 
-/// Eq. 8 between simulated laps and as many measured ones, in [`EQ_8_MODES`]; `None` where it cannot be told.
-fn eq_8(simulated: &MeanLaps, measured_m: &[Vec<f64>]) -> [Option<f64>; 2] {
-    let fit = || {
-        let simulated: Vec<Vec<f64>> = simulated.laps_m().take(measured_m.len()).cloned().collect();
-        let simulated = pdm::Cluster::new("simulated", &simulated).ok()?;
-        let measured = pdm::Cluster::new("measured", measured_m).ok()?;
-        let model = pdm::Pdm::fit([&simulated, &measured]).ok()?;
-        Some((model, simulated, measured))
+/// What is simulated for one held-out run, of which no fit knows.
+struct Beside<'a> {
+    before: Cow<'a, MeanLaps>,
+    after: Cow<'a, MeanLaps>,
+    /// What runs like it are drawn from, once the effects are added.
+    of_chance: Cow<'a, MeanLaps>,
+}
+
+type LapsOf = for<'a> fn(&'a Beside<'a>) -> &'a MeanLaps;
+
+impl LapTimes {
+    fn of(held_out: &[SampledRun], beside: &[Beside<'_>]) -> Self {
+        let measured_s: Vec<f64> = held_out.iter().flat_map(SampledRun::lap_times_s).collect();
+        let laps = measured_s.len() as f64;
+        let share = |run: &SampledRun| run.laps.len() as f64 / laps;
+        let runs = || held_out.iter().zip(beside);
+        let variance = |(run, beside): (&SampledRun, &Beside<'_>)| {
+            (share(run) * beside.of_chance.lap_chance_s(run.laps.len())).powi(2)
+        };
+        Self {
+            measured_s: measured_s.iter().sum::<f64>() / laps,
+            before_s: runs()
+                .map(|(run, beside)| share(run) * beside.before.lap_s())
+                .sum(),
+            after_s: runs()
+                .map(|(run, beside)| share(run) * beside.after.lap_s())
+                .sum(),
+            chance_s: runs().map(variance).sum::<f64>().sqrt(),
+        }
+    }
+}
+
+/// Eq. 8 between measured runs and as many simulated laps of each, in [`EQ_8_MODES`].
+fn eq_8(runs_m: &[Vec<Vec<f64>>], beside: &[Beside<'_>]) -> [Eq8; 2] {
+    /// Pairs of simulated clusters that tell chance.
+    const PAIRS: usize = 4;
+    let total = runs_m.iter().map(Vec::len).sum::<usize>();
+    // No lap stands for two: neither in one cluster nor in another.
+    let simulated = |laps: LapsOf, cluster: usize| -> Option<Vec<Vec<f64>>> {
+        let mut own = Vec::new();
+        for (run, beside) in runs_m.iter().zip(beside) {
+            let first = cluster * total + own.len();
+            own.extend(laps(beside).laps_m().skip(first).take(run.len()).cloned());
+        }
+        (own.len() == total).then_some(own)
     };
-    let Some((model, simulated, measured)) = fit() else {
+    let measured = runs_m.concat();
+    let to_measured = |laps: LapsOf| {
+        simulated(laps, 0).map_or([None; 2], |simulated| distances_in_modes(&simulated, &measured))
+    };
+    let (before, after) = (to_measured(|b| &b.before), to_measured(|b| &b.after));
+    let chance: Vec<[Option<f64>; 2]> = (0..PAIRS)
+        .map_while(|pair| {
+            let of_chance = |cluster| simulated(|b| &b.of_chance, cluster);
+            Some(distances_in_modes(
+                &of_chance(2 * pair)?,
+                &of_chance(2 * pair + 1)?,
+            ))
+        })
+        .collect();
+    [0, 1].map(|i| {
+        let told: Vec<f64> = chance.iter().filter_map(|of| of[i]).collect();
+        Eq8 {
+            modes: EQ_8_MODES[i],
+            before: before[i],
+            after: after[i],
+            chance: (!told.is_empty()).then(|| told.iter().sum::<f64>() / told.len() as f64),
+        }
+    })
+}
+
+/// Eq. 8 between two clusters of laps, in [`EQ_8_MODES`] of a PDM of both; `None` where it cannot be told.
+fn distances_in_modes(one_m: &[Vec<f64>], other_m: &[Vec<f64>]) -> [Option<f64>; 2] {
+    let fit = || {
+        let one = pdm::Cluster::new("one", one_m).ok()?;
+        let other = pdm::Cluster::new("other", other_m).ok()?;
+        let model = pdm::Pdm::fit([&one, &other]).ok()?;
+        Some((model, one, other))
+    };
+    let Some((model, one, other)) = fit() else {
         return [None; 2];
     };
     EQ_8_MODES.map(|modes| {
         let project = |cluster| model.project(cluster, pdm::Modes::First(modes)).ok();
-        pdm::distance(&project(&simulated)?, &project(&measured)?).ok()
+        pdm::distance(&project(&one)?, &project(&other)?).ok()
     })
-}
-
-/// How far a run is from the simulations before and after, and from others of the latter by chance, m.
-fn distances(run: &SampledRun, before: &MeanLaps, after: &MeanLaps, of_chance: &MeanLaps) -> [f64; 3] {
-    let offsets_m = run.offsets_m();
-    [
-        before.distance_m(&offsets_m),
-        after.distance_m(&offsets_m),
-        of_chance.floor_m(run.laps.len()),
-    ]
 }
 
 /// The mean lap of a model with effects: of runs that take the places of some measured runs, of up to `longest` laps, in turn.

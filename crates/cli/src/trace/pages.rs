@@ -6,7 +6,7 @@ use sim::Pattern;
 
 use super::answer::rivals;
 use super::document::distinct;
-use super::errors::Eq8;
+use super::errors::{Eq8, LapTimes};
 use super::limits::{decide_in_words, limits, next_experiment, next_in_words, stages};
 use super::unnamed::{in_words, unnamed};
 use super::{Trace, pictures};
@@ -256,18 +256,33 @@ fn error_table(trace: &Trace) -> Table {
             mean_mm(&errors.after_m),
             mean_mm(&errors.floor_m),
         ]);
-        let measured_s = errors.measured_lap_s();
-        let [before, after] = errors
-            .simulated_lap_s()
-            .map(|s| format!("{:+.2}", s - measured_s));
-        table.push([format!("{of}lap time, s off"), before, after, "0".into()]);
+        let LapTimes {
+            measured_s,
+            before_s,
+            after_s,
+            chance_s,
+        } = errors.lap_times;
+        let [before, after] = [before_s, after_s].map(|s| format!("{:+.2}", s - measured_s));
+        table.push([
+            format!("{of}lap time, s off"),
+            before,
+            after,
+            format!("{chance_s:.2}"),
+        ]);
         if let Some(starts) = &errors.starts {
             let [before, after, chance] = starts.errors_mm().map(|mm| format!("{mm:.2}"));
             table.push([format!("{of}start of runs, rms, mm"), before, after, chance]);
         }
-        for Eq8 { modes, before, after } in errors.eq_8() {
-            let [before, after] = [before, after].map(|d| d.map_or("-".into(), |d| format!("{d:.2}")));
-            table.push([format!("{of}eq. 8 in {modes} modes"), before, after, "-".into()]);
+        for of_modes in errors.eq_8 {
+            let Eq8 {
+                modes,
+                before,
+                after,
+                chance,
+            } = of_modes;
+            let [before, after, chance] =
+                [before, after, chance].map(|d| d.map_or("-".into(), |d| format!("{d:.2}")));
+            table.push([format!("{of}eq. 8 in {modes} modes"), before, after, chance]);
         }
     }
     table

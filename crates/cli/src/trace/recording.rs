@@ -144,7 +144,7 @@ impl Recording {
         let source = file.world(world)?;
         belongs(&set, &config, &source.text)?;
         let circuit = setup::circuit(&source, config.run.gates)?;
-        let measured = Measured::on(set, circuit.clone())?;
+        let measured = Measured::on(set, circuit.clone(), &file.config)?;
         measured
             .runs
             .iter()
@@ -408,7 +408,7 @@ impl HeldOut {
             })?;
         belongs(&set, &config, &recordings[place].world)?;
         let Recording { measured, setup, .. } = &recordings[place];
-        let measured = Measured::on(set, measured.circuit.clone())?;
+        let measured = Measured::on(set, measured.circuit.clone(), &file.config)?;
         is_timed(&measured, setup)?;
         Ok(Self {
             recording: place,
