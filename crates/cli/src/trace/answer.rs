@@ -100,12 +100,13 @@ impl<'a> TracedLaps<'a> {
         let found = self
             .atlas
             .diagnose(&simulate, &self.runs, &self.places(), watch)?;
+        watch("how small effects would be seen");
         Ok(Named {
             residual: found.residual,
             answer: found.answer,
             from_logs: None,
             baselines: Some(self.atlas.baselines(&self.runs)?),
-            detectable: self.atlas.detectable(),
+            detectable: self.atlas.detectable(&simulate),
         })
     }
 
