@@ -79,6 +79,16 @@ impl Explanation {
         self.effects.iter().any(|effect| *effect.setting.spec == UNLISTED)
     }
 
+    /// The part of what it explains that each of its effects has, by what they do alone; they add up to 1.
+    pub fn parts(&self) -> Vec<f64> {
+        let total: f64 = self.effects.iter().map(|effect| effect.weight).sum();
+        if total > 0.0 && total.is_finite() {
+            self.effects.iter().map(|effect| effect.weight / total).collect()
+        } else {
+            vec![1.0 / self.effects.len() as f64; self.effects.len()]
+        }
+    }
+
     /// Whether data speak for another explanation by more effects: each further number gains five units of log-likelihood, and all of
     /// them more than the faults of models do.
     pub(crate) fn lacks_as(&self, other: &Self) -> bool {
@@ -299,6 +309,7 @@ mod tests {
             intervals: std::collections::BTreeMap::new(),
             gain: 100.0,
             fitted: 1,
+            weight: 1.0,
         };
         let explanation = Explanation {
             effects: vec![effect("wheel-scale", speed), effect("slip-level", slip)],
@@ -330,6 +341,17 @@ mod tests {
         let further = gains.iter().map(|more| by(2, 1000.0 + more));
         claimed.explanations = std::iter::once(by(1, 1000.0)).chain(further).collect();
         claimed
+    }
+
+    #[test]
+    fn effects_share_what_is_explained_by_what_they_do() {
+        let mut explanation = answer(0.9, 2.0).explanations.remove(0);
+        assert_eq!(explanation.parts(), [0.5, 0.5]);
+        explanation.effects[0].weight = 3.0;
+        assert_eq!(explanation.parts(), [0.75, 0.25]);
+        // What a cause without a name does alone is not known.
+        explanation.effects[0].weight = f64::INFINITY;
+        assert_eq!(explanation.parts(), [0.5, 0.5]);
     }
 
     #[test]

@@ -25,6 +25,8 @@ pub struct Candidate {
     pub gain: f64,
     /// Number of fitted values.
     pub fitted: usize,
+    /// How much it does alone, in units that the effects of an explanation share: squared distance from the declared model.
+    pub weight: f64,
 }
 
 impl Candidate {
@@ -246,6 +248,7 @@ mod tests {
             intervals: BTreeMap::new(),
             gain: 1.0,
             fitted: 1,
+            weight: 1.0,
         };
         let near =
             |[low, high]: [f64; 2], [a, b]: [f64; 2]| (low - a).abs() < 1e-12 && (high - b).abs() < 1e-12;

@@ -149,8 +149,7 @@ fn residual(trace: &Trace) -> Value {
 }
 
 fn effects(answer: &Explanation, rivals: &[Explanation], laps: Option<&Departures>) -> Vec<Value> {
-    let count = answer.effects.len() as f64;
-    let names = answer.names();
+    let (names, parts) = (answer.names(), answer.parts());
     let rivals: Vec<Vec<&str>> = rivals
         .iter()
         .map(|rival| in_place(&names, rival.names()))
@@ -162,7 +161,7 @@ fn effects(answer: &Explanation, rivals: &[Explanation], laps: Option<&Departure
         alternatives.dedup();
         let mut entry = one_effect(effect);
         // Where no share of the excess can be stated, it is the share of what is explained.
-        entry["share"] = json!(answer.explained(laps).unwrap_or(1.0) / count);
+        entry["share"] = json!(answer.explained(laps).unwrap_or(1.0) * parts[place]);
         entry["alternatives"] = json!(alternatives);
         entry
     };

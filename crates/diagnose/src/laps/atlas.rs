@@ -51,7 +51,7 @@ impl Extent {
 pub(super) const NULL_SETS: u64 = 200;
 
 /// Data sets simulated for each size of a probe at most, and the variance, in data sets' own, that fewer are enough for.
-const PATH_SETS: u64 = 3;
+pub(super) const PATH_SETS: u64 = 3;
 const PATH_ERROR: f64 = 0.12;
 
 /// Data sets simulated for each other way to cut the walls.

@@ -1,8 +1,9 @@
 //! How large an effect must be to be seen.
 
 use rayon::prelude::*;
+use sim::Setting;
 
-use super::atlas::{Atlas, Simulate, White};
+use super::atlas::{Atlas, PATH_SETS, Simulate, White};
 use super::diagnosis::ALARM_SCORE;
 use super::probe::Probe;
 use super::screen::price;
@@ -17,14 +18,18 @@ impl Atlas {
     /// The smallest sizes of all effects that these data show, probe by probe; vectors along their axes.
     pub fn detectable(&self, simulate: &Simulate<'_>) -> Vec<Detectable> {
         let trial = Trial::new(self, simulate, &self.null);
+        let nodes = (0..self.probes.len()).flat_map(|probe| self.nodes(probe));
+        let directions: Vec<White> = nodes
+            .filter_map(|(_, action)| action.try_normalize(f64::MIN_POSITIVE))
+            .collect();
         (0..self.probes.len())
             .into_par_iter()
             .filter(|&probe| !self.probes[probe].sizes.is_empty())
-            .filter_map(|probe| self.detectable_of(probe, &trial))
+            .filter_map(|probe| self.detectable_of(probe, &trial, &directions))
             .collect()
     }
 
-    fn detectable_of(&self, probe: usize, trial: &Trial<'_>) -> Option<Detectable> {
+    fn detectable_of(&self, probe: usize, trial: &Trial<'_>, directions: &[White]) -> Option<Detectable> {
         let p = &self.probes[probe];
         let param = &p.spec.params[p.only_moving()?];
         let nodes = self.nodes(probe);
@@ -39,7 +44,7 @@ impl Atlas {
             } else if p.odd || self.has_others_like(p) {
                 smallest(&own, needed)
             } else {
-                let signal = |size: f64| trial.signal_of(p, p.neutral + sign * size);
+                let signal = |size: f64| trial.signal_of(&p.setting(p.neutral + sign * size), directions);
                 smallest_simulated(&own, needed, signal)
             };
             size.map(|size| p.neutral + sign * size)
@@ -66,14 +71,22 @@ impl Atlas {
 }
 
 impl Trial<'_> {
-    /// How far a size of a probe is from the declared model, in standard deviations: two data sets tell it, whose noise is not the
-    /// same. `None` where the robot crashes.
-    fn signal_of(&self, probe: &Probe, size: f64) -> Option<f64> {
-        let settings = [probe.setting(size)];
-        let square = self
-            .kept_action(&settings, 0)?
-            .dot(&self.kept_action(&settings, 1)?);
-        Some(square.max(0.0).sqrt())
+    /// How far an effect brings laps from the declared model along the direction that shows it best, in standard deviations; `None`
+    /// where the robot crashes.
+    fn signal_of(&self, effect: &Setting, directions: &[White]) -> Option<f64> {
+        /// Data sets by which no path was simulated.
+        const SETS: [u64; 2] = [PATH_SETS, PATH_SETS + 1];
+        let effect = std::slice::from_ref(effect);
+        let mut action = White::zeros(self.atlas.layout.len());
+        for set in SETS {
+            action += self.kept_action(effect, set)? / SETS.len() as f64;
+        }
+        Some(
+            directions
+                .iter()
+                .map(|along| along.dot(&action))
+                .fold(0.0, f64::max),
+        )
     }
 }
 

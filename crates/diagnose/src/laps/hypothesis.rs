@@ -221,14 +221,20 @@ impl Hypothesis {
         }
     }
 
-    /// How much a part does, for an order of importance: its squared action along its path.
+    /// How much a part does, for an order of importance: its squared action along its path, on average over the runs; infinite of a
+    /// cause without a name.
     pub(super) fn weight(&self, part: usize, atlas: &Atlas) -> f64 {
         let part = &self.parts[part];
         let nodes = atlas.nodes(part.probe);
         if nodes.len() < 2 {
             return f64::INFINITY;
         }
-        at(&nodes, part.mean_size(atlas)).norm_squared()
+        let square = |values: &Vec<f64>| at(&nodes, atlas.probes[part.probe].size_of(values)).norm_squared();
+        let values = match part.shape {
+            Shape::ByTime => part.plain(atlas).values,
+            Shape::Constant | Shape::ByRun => part.values.clone(),
+        };
+        values.iter().map(square).sum::<f64>() / values.len() as f64
     }
 
     /// What counts of a gain in log-likelihood.

@@ -463,20 +463,18 @@ pub(super) fn candidates(
     gain: f64,
 ) -> Vec<Candidate> {
     let settings = hypothesis.settings(atlas);
-    let mut effects: Vec<(f64, Candidate)> = (settings.into_iter().enumerate())
-        .map(|(part, setting)| {
-            let candidate = Candidate {
-                setting,
-                gain,
-                fitted: hypothesis.parts[part].fitted(part, errors),
-                standard_errors: hypothesis.parts[part].errors(part, errors, atlas),
-                intervals: hypothesis.parts[part].intervals(part, intervals),
-            };
-            (hypothesis.weight(part, atlas), candidate)
+    let mut effects: Vec<Candidate> = (settings.into_iter().enumerate())
+        .map(|(part, setting)| Candidate {
+            setting,
+            gain,
+            fitted: hypothesis.parts[part].fitted(part, errors),
+            standard_errors: hypothesis.parts[part].errors(part, errors, atlas),
+            intervals: hypothesis.parts[part].intervals(part, intervals),
+            weight: hypothesis.weight(part, atlas),
         })
         .collect();
-    effects.sort_by(|a, b| b.0.total_cmp(&a.0));
-    effects.into_iter().map(|(_, candidate)| candidate).collect()
+    effects.sort_by(|a, b| b.weight.total_cmp(&a.weight));
+    effects
 }
 
 /// Of explanations those that do not have the effects of an earlier one, whatever their patterns.

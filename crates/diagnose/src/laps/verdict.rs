@@ -233,6 +233,7 @@ mod tests {
             intervals: BTreeMap::new(),
             gain: score,
             fitted: 1,
+            weight: 1.0,
         };
         Explanation {
             effects: names.iter().map(candidate).collect(),

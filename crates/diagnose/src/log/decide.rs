@@ -203,6 +203,7 @@ fn candidate(name: &str, factors: &[Option<Relative>]) -> Option<Candidate> {
         intervals: BTreeMap::new(),
         gain: f64::INFINITY,
         fitted,
+        weight: 1.0,
     })
 }
 

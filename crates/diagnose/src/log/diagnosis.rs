@@ -293,6 +293,7 @@ impl Search<'_> {
             intervals: BTreeMap::new(),
             gain: self.rounding_gain,
             fitted: 1,
+            weight: 1.0,
         })
     }
 
@@ -305,6 +306,7 @@ impl Search<'_> {
                 intervals: BTreeMap::new(),
                 gain: refined.gain,
                 fitted: errors.iter().filter(|error| **error > 0.0).count(),
+                weight: 1.0,
             });
         let was_looked_at = self.remainder.beside == refined.settings;
         Explanation {
