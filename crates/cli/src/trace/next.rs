@@ -40,12 +40,22 @@ pub(crate) struct Experiment {
 }
 
 impl Experiment {
-    /// Standard deviations between the answer and the rival that is nearest to it.
+    /// The rivals that it tells from the answer, with standard deviations, if it is made with enough laps.
+    pub(crate) fn told(&self) -> impl Iterator<Item = &(String, f64)> {
+        let is_told = |(_, sigmas): &&(String, f64)| self.laps_for(*sigmas).is_some();
+        self.separations.iter().filter(is_told)
+    }
+
+    /// Standard deviations between the answer and the nearest of the rivals that it tells; of all if it tells none.
     pub(crate) fn least(&self) -> f64 {
-        self.separations
-            .iter()
-            .map(|(_, s)| *s)
-            .fold(f64::INFINITY, f64::min)
+        let told = self.told().map(|(_, sigmas)| *sigmas).reduce(f64::min);
+        let most = || {
+            self.separations
+                .iter()
+                .map(|(_, sigmas)| *sigmas)
+                .fold(0.0, f64::max)
+        };
+        told.unwrap_or_else(most)
     }
 
     /// What it is expected to tell, in words.
@@ -61,9 +71,14 @@ impl Experiment {
         }
     }
 
-    /// Laps that tell the answer from every rival; `None` if that would take too many.
+    /// Laps that tell the answer from the rivals that it tells; `None` if that would take too many.
     pub(crate) fn laps_needed(&self) -> Option<usize> {
-        let needed = (self.laps as f64 * (ENOUGH / self.least()).powi(2)).ceil();
+        self.laps_for(self.least())
+    }
+
+    /// Laps that tell what lies apart so far.
+    fn laps_for(&self, sigmas: f64) -> Option<usize> {
+        let needed = (self.laps as f64 * (ENOUGH / sigmas).powi(2)).ceil();
         (needed <= MOST_LAPS as f64).then_some((needed as usize).max(RUNS))
     }
 }
@@ -119,15 +134,45 @@ pub(crate) fn experiments(trace: &Trace, seed: u64) -> Result<Vec<Experiment>> {
     if others.is_empty() {
         return Ok(Vec::new());
     }
-    let recording = &trace.recordings[0];
+    let look = |with: With| looked_at(&trace.recordings[0], with, answer, &others, seed);
+    if trace.from_logs.is_none() {
+        return look(With::Laps);
+    }
+    // Where there is a log it says more than laps, but for what it takes for the same.
+    let found = look(With::Logs)?;
+    if found.is_empty() {
+        return look(With::LapsAlone);
+    }
+    Ok(found)
+}
+
+/// What is recorded in experiments.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum With {
+    /// Laps, and the robot's log too as things are.
+    Laps,
+    /// Laps alone.
+    LapsAlone,
+    /// The robot's log.
+    Logs,
+}
+
+/// Experiments that would tell an answer from some of its rivals, the best first.
+fn looked_at(
+    recording: &Recording,
+    with: With,
+    answer: &Explanation,
+    others: &[&Explanation],
+    seed: u64,
+) -> Result<Vec<Experiment>> {
     let mut found = Vec::new();
     for (name, declared) in ideas(&recording.config, &recording.setup) {
         interrupt::check()?;
         let Some(setup) = changed(recording, &declared) else {
             continue;
         };
-        if trace.from_logs.is_none() {
-            let separations = by_laps(&setup, answer, &others, seed);
+        if with != With::Logs {
+            let separations = by_laps(&setup, answer, others, seed);
             found.extend(separations.map(|separations| Experiment {
                 name: name.clone(),
                 declared: declared.clone(),
@@ -135,9 +180,8 @@ pub(crate) fn experiments(trace: &Trace, seed: u64) -> Result<Vec<Experiment>> {
                 laps: RUNS * LAPS,
             }));
         }
-        // The robot's log is worth having with the laps as they are, and where there is one it says more than laps.
-        if declared.is_empty() || trace.from_logs.is_some() {
-            let separations = by_logs(&setup, answer, &others, seed);
+        if with == With::Logs || with == With::Laps && declared.is_empty() {
+            let separations = by_logs(&setup, answer, others, seed);
             found.extend(separations.map(|separations| Experiment {
                 name: format!("{name}, with the robot's log of readings and commands"),
                 declared,
@@ -148,11 +192,20 @@ pub(crate) fn experiments(trace: &Trace, seed: u64) -> Result<Vec<Experiment>> {
     }
     // Interrupted, the last one came to nothing.
     interrupt::check()?;
-    found.retain(|experiment| experiment.least() > 0.3);
+    Ok(best_first(found))
+}
+
+/// Experiments that tell something, the best first: those that tell the answer from most rivals, and of these those that take fewest laps.
+fn best_first(mut found: Vec<Experiment>) -> Vec<Experiment> {
+    /// Standard deviations that tell nothing.
+    const NOTHING: f64 = 0.3;
+    found.retain(|experiment| experiment.least() > NOTHING);
+    let of_a_lap = |experiment: &Experiment| experiment.least() / (experiment.laps as f64).sqrt();
     found.sort_by(|a, b| {
-        (b.least() / (b.laps as f64).sqrt()).total_cmp(&(a.least() / (a.laps as f64).sqrt()))
+        let told = b.told().count().cmp(&a.told().count());
+        told.then(of_a_lap(b).total_cmp(&of_a_lap(a)))
     });
-    Ok(found)
+    found
 }
 
 /// The declared model with some keys set otherwise; `None` if it cannot drive so.
@@ -249,4 +302,32 @@ fn first_runs(settings: &[Setting]) -> Vec<Setting> {
         _ => setting.clone(),
     };
     settings.iter().map(fitted).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_rival_that_nothing_tells_does_not_hide_what_tells_the_others() {
+        let experiment = |name: &str, laps: usize, separations: &[(&str, f64)]| Experiment {
+            name: name.into(),
+            declared: Vec::new(),
+            separations: separations
+                .iter()
+                .map(|(rival, s)| ((*rival).into(), *s))
+                .collect(),
+            laps,
+        };
+        let found = best_first(vec![
+            experiment("useless", 32, &[("a", 0.1), ("b", 0.0), ("c", 0.2)]),
+            experiment("of two", 32, &[("a", 8.0), ("b", 0.0), ("c", 6.0)]),
+            experiment("of one", 12, &[("a", 9.0), ("b", 0.1), ("c", 0.0)]),
+        ]);
+        let least: Vec<(&str, f64)> = found.iter().map(|e| (e.name.as_str(), e.least())).collect();
+        assert_eq!(least, [("of two", 6.0), ("of one", 9.0)]);
+        // 6 standard deviations of 32 laps, and 5 of (5 / 6)^2 as many.
+        assert_eq!(found[0].laps_needed(), Some(23));
+        assert_eq!(found[0].told().count(), 2);
+    }
 }

@@ -1,12 +1,13 @@
 //! How far a robot's log would tell two explanations apart.
 
-use sim::{Model, Scene, Setting};
+use sim::{Model, Pattern, Scene, Setting, find};
 
 use super::evidence::{Evidence, widened};
 use super::groups::{area_variants, unlisted_variants};
 use super::refine::{knobs_of, refine};
 use super::rows::LogRow;
 use super::steps::written_step;
+use crate::slip::level_of;
 
 /// The distance in standard deviations, for these logs of a robot with the answer's effects, between the answer and a rival that
 /// is fitted to them. `None` for logs that cannot be followed.
@@ -27,8 +28,36 @@ pub fn log_separation(
         models: &models,
         ..masks
     };
+    let [answer, rival] = [answer, rival].map(with_levels);
     let variants = [evidence.variants(), unlisted_variants(), area_variants()].concat();
-    let knobs = knobs_of(rival, &variants);
-    let best = refine(&evidence, rival.to_vec(), knobs, STEPS)?.log_likelihood;
-    Some((2.0 * (evidence.likelihood(answer)? - best).max(0.0)).sqrt())
+    let knobs = knobs_of(&rival, &variants);
+    let best = refine(&evidence, rival, knobs, STEPS)?.log_likelihood;
+    Some((2.0 * (evidence.likelihood(&answer)? - best).max(0.0)).sqrt())
+}
+
+/// Effects with slip that has a memory as the level that a filter takes it for.
+fn with_levels(settings: &[Setting]) -> Vec<Setting> {
+    let as_level = |setting: &Setting| match (setting.spec.name, &setting.pattern, find("slip-level")) {
+        ("slip-memory", Pattern::Constant(values), Ok(level)) => {
+            Setting::constant(level, [level_of(values[0])])
+        }
+        _ => setting.clone(),
+    };
+    settings.iter().map(as_level).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_memory_is_a_level_to_a_filter() {
+        let [gain, memory] = ["reading-gain", "slip-memory"].map(|name| find(name).unwrap());
+        let settings = [Setting::constant(gain, [1.1]), Setting::constant(memory, [0.6])];
+        let seen = with_levels(&settings);
+        assert_eq!(seen[0], settings[0]);
+        assert_eq!(seen[1].spec.name, "slip-level");
+        // (1 + .6) / (1 - .6) = 2 squared.
+        assert!((seen[1].pattern.numbers()[0] - 2.0).abs() < 1e-9);
+    }
 }
