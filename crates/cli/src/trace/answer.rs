@@ -36,6 +36,8 @@ pub(super) struct TracedLaps<'a> {
 /// What is claimed, and why.
 pub(super) struct Named {
     pub(super) residual: Departures,
+    /// Probability of what was seen if the declared model were the robot.
+    pub(super) p: f64,
     pub(super) answer: Answer,
     pub(super) from_logs: Option<FromLogs>,
     pub(super) baselines: Option<Baselines>,
@@ -103,6 +105,7 @@ impl<'a> TracedLaps<'a> {
         watch("how small effects would be seen");
         Ok(Named {
             residual: found.residual,
+            p: found.p,
             answer: found.answer,
             from_logs: None,
             baselines: Some(self.atlas.baselines(&self.runs)?),
@@ -143,6 +146,7 @@ impl<'a> TracedLaps<'a> {
             after,
         };
         Ok(Named {
+            p: residual.omnibus_p().min(found.logs.p),
             residual,
             answer: found.answer(),
             baselines: None,

@@ -113,6 +113,7 @@ fn laps(errors: &Errors) -> Value {
     json!({
         "lap_time_s": { "measured": measured_s, "before": before_s, "after": after_s, "chance": chance_s },
         "eq_8": errors.eq_8.map(eq_8),
+        "with_own_sizes_m": errors.own_m,
     })
 }
 
@@ -136,11 +137,10 @@ fn residual(trace: &Trace) -> Value {
         (None, Some(claimed)) => claimed.effects.first().map(Candidate::stage),
         (None, None) => None,
     };
-    let p = trace.from_logs.as_ref().map_or(1.0, |found| found.logs.p);
     json!({
         "stage": stage.map(sim::Stage::name),
         "significant": trace.answer.verdict != Verdict::Faithful,
-        "p": numbers.omnibus_p().min(p),
+        "p": trace.p,
         "where": numbers.departing(),
         "acts_on": trace.answer.cause.as_ref().map(|cause| &cause.acts_on),
         "depends_on": trace.answer.cause.as_ref().map(|cause| &cause.depends_on),

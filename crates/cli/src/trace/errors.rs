@@ -6,7 +6,7 @@ use std::ops::Range;
 use anyhow::Result;
 use diagnose::{Answer, MeanBeginning, MeanLaps, Unseen};
 use rayon::prelude::*;
-use sim::{Setting, Streams};
+use sim::{Pattern, Setting, Streams};
 use track::Lap;
 
 use super::beginnings::{Beginnings, simulated_beginning};
@@ -36,6 +36,8 @@ pub(crate) struct Errors {
     /// For each held-out run: root mean square distances, m.
     pub(crate) before_m: Vec<f64>,
     pub(crate) after_m: Vec<f64>,
+    /// The same with the run's own size, where sizes go by run: no fit without a run knows it.
+    pub(crate) own_m: Option<Vec<f64>>,
     /// What it is for runs of the model with the effects, m.
     pub(crate) floor_m: Vec<f64>,
     pub(crate) lap_times: LapTimes,
@@ -177,7 +179,18 @@ impl Judged<'_> {
             });
         }
         let starts = self.starts(&recording.beginnings)?;
-        Ok(self.errors(&all, runs.clone(), &beside, starts))
+        let mut errors = self.errors(&all, runs.clone(), &beside, starts);
+        let settings = self.answer.settings();
+        if settings
+            .iter()
+            .any(|setting| matches!(setting.pattern, Pattern::ByRun(_)))
+        {
+            let own = |(at, run): (usize, &SampledRun)| {
+                Ok(simulated(&settings, at..at + 1)?.distance_m(&run.offsets_m()))
+            };
+            errors.own_m = Some(runs.iter().enumerate().map(own).collect::<Result<_>>()?);
+        }
+        Ok(errors)
     }
 
     /// The mean laps of the declared model and of that with the answer's effects, if it has any.
@@ -215,6 +228,7 @@ impl Judged<'_> {
             after: after.clone(),
             before_m: of_each(|beside, run| beside.before.distance_m(run)),
             after_m: of_each(|beside, run| beside.after.distance_m(run)),
+            own_m: None,
             floor_m: of_each(|beside, run| beside.of_chance.floor_m(run.len())),
             lap_times: LapTimes::of(&held_out, beside),
             eq_8: eq_8(&laps_m, beside),

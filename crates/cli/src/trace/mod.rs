@@ -52,6 +52,8 @@ pub(crate) struct Trace {
     pub(crate) recordings: Vec<Recording>,
     /// How the laps depart from the declared model.
     pub(crate) residual: Departures,
+    /// Probability of what was seen if the declared model were the robot.
+    pub(crate) p: f64,
     /// What is claimed.
     pub(crate) answer: Answer,
     /// What the robot's logs say, where there are logs.
@@ -148,6 +150,7 @@ impl Trace {
             recordings,
             errors,
             residual: named.residual,
+            p: named.p,
             answer: named.answer,
             from_logs: named.from_logs,
             baselines: named.baselines,

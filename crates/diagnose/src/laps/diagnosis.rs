@@ -31,6 +31,8 @@ const PATTERNS_OF_SEVERAL: usize = 2;
 pub struct LapDiagnosis {
     /// How the data depart from the declared model.
     pub residual: Departures,
+    /// Probability of what raised the alarm, if anything did, else of the omnibus.
+    pub p: f64,
     /// What is claimed.
     pub answer: Answer,
 }
@@ -68,13 +70,20 @@ impl Atlas {
         let ripple = search.ripple(&Hypothesis::nothing());
         let mut constant = screened.iter().filter(|s| s.hypothesis.is_constant());
         let best_constant = constant.next().map_or(0.0, |best| best.score);
-        let alarm = numbers.omnibus_p() < ALARM_P || best_constant > ALARM_SCORE;
-        if !alarm && ripple.is_none() {
+        // A score has the price of having been chosen, so that chance comes by it as seldom as by so likely an effect.
+        let alarms = [
+            (numbers.omnibus_p() < ALARM_P).then(|| numbers.omnibus_p()),
+            (best_constant > ALARM_SCORE).then(|| (-best_constant).exp()),
+            ripple.as_ref().map(Ripple::p),
+        ];
+        let alarm_p = alarms.into_iter().flatten().reduce(f64::min);
+        let Some(p) = alarm_p else {
             return Ok(LapDiagnosis {
                 residual: numbers,
+                p: numbers.omnibus_p(),
                 answer: Answer::faithful(runs.len()),
             });
-        }
+        };
         let mut found = match ripple {
             Some(ripple) => explain_ripple(&search, &screened, &ripple),
             None => explain(&search, search.singles(&screened)),
@@ -108,6 +117,7 @@ impl Atlas {
         }
         Ok(LapDiagnosis {
             residual: numbers,
+            p,
             answer: Answer {
                 verdict,
                 explanations: found.into_iter().map(|f| f.explanation).collect(),

@@ -351,7 +351,9 @@ impl Part {
                 }
                 Some(i) => {
                     let runs = freedom.run.map_or(0..self.values.len(), |run| run..run + 1);
-                    runs.for_each(|run| all[run * count + i] = *error);
+                    // Any size that comes to the same step is as good.
+                    let within_step = freedom.quantum.map_or(0.0, |step| step / 12.0_f64.sqrt());
+                    runs.for_each(|run| all[run * count + i] = error.max(within_step));
                 }
             }
         }
