@@ -211,17 +211,19 @@ fn by(effect: &Candidate) -> Value {
 pub(crate) fn parameters(effect: &Candidate) -> Vec<Value> {
     let params = effect.setting.spec.params;
     let entry = |param: &sim::Param, name: String, value: Value, low: Value, high: Value| {
-        let named = |value: &Value| {
+        let one_named = |value: &Value| {
             let choice = value.as_f64().and_then(|v| param.choices.get(v as usize));
             choice
                 .filter(|_| param.neutral.is_none())
                 .map_or_else(|| value.clone(), |choice| json!(choice))
         };
-        let value = match &value {
-            Value::Array(runs) => runs.iter().map(named).collect(),
-            _ => named(&value),
+        let named = |value: &Value| match value {
+            Value::Array(runs) => runs.iter().map(one_named).collect(),
+            _ => one_named(value),
         };
-        json!({ "name": name, "value": value, "unit": param.unit, "low": low, "high": high })
+        json!({
+            "name": name, "value": named(&value), "unit": param.unit, "low": named(&low), "high": named(&high),
+        })
     };
     let one = |param: &sim::Param, name: String, value: f64, place: usize| {
         let [low, high] = effect.interval(place);

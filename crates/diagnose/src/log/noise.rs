@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::ops::{ControlFlow, Range};
 
+use rayon::prelude::*;
 use sim::{Pattern, Setting, Spec, find};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 use statrs::statistics::Statistics;
@@ -11,6 +12,7 @@ use super::evidence::Evidence;
 use super::leads::{By, tail};
 use super::refined::Refined;
 use super::repeat::{REPEATS, some_repeats};
+use crate::detectable::{Detectable, QUANTILE_95};
 use crate::slip::memory_of;
 
 /// The effects on noise.
@@ -120,6 +122,38 @@ pub(crate) fn p_among(number: f64, others: &[f64]) -> Option<f64> {
     Some(2.0 * law.sf((number - others.mean()).abs() / error))
 }
 
+/// The smallest and largest factors of the noise effects that raise an alarm of this probability in 95 of 100 cases, by how sharply the
+/// likelihood, which is `base` as declared, tells them among simulated logs ([`p_among_repeats`]); and the memory of slip that does as
+/// the level.
+pub(crate) fn detectable_noises(evidence: &Evidence<'_>, base: f64, alarm: f64) -> Vec<Detectable> {
+    let among = StudentsT::new(0.0, 1.0, REPEATS as f64 - 1.0);
+    let needed = among.map_or(f64::NAN, |law| -law.inverse_cdf(0.5 * alarm / FACTORS)) + QUANTILE_95;
+    let sized = |name: &&str| {
+        let factor = Factor::neutral(find(name).ok()?);
+        let log = needed * factor.error(evidence, &[], base)?;
+        Some(seen(factor.spec, [(-log).exp(), log.exp()]))
+    };
+    let mut all: Vec<Detectable> = NOISES.par_iter().filter_map(sized).collect();
+    let more = (all.iter().find(|of| of.spec.name == "slip-level")).and_then(|slip| slip.above);
+    if let (Some(more), Ok(memory)) = (more, find("slip-memory")) {
+        all.push(seen(memory, [f64::NEG_INFINITY, memory_of(more)]));
+    }
+    all
+}
+
+/// An effect that is seen beyond these sizes, as far as its range goes.
+fn seen(spec: &'static Spec, [below, above]: [f64; 2]) -> Detectable {
+    let param = &spec.params[0];
+    Detectable {
+        spec,
+        label: spec.name.to_owned(),
+        parameter: param.name,
+        unit: param.unit,
+        below: Some(below).filter(|below| *below > param.low),
+        above: Some(above).filter(|above| *above < param.high),
+    }
+}
+
 /// Factors that are tried, each upwards and downwards (Bonferroni).
 const FACTORS: f64 = 2.0 * NOISES.len() as f64;
 
@@ -211,6 +245,17 @@ impl Factor {
         Some(Self { gain, ..self.clone() })
     }
 
+    /// The standard error of its logarithm.
+    fn error(&self, evidence: &Evidence<'_>, settings: &[Setting], base: f64) -> Option<f64> {
+        /// Logarithm of the factor to either side over which the log-likelihood's curvature tells the error: it is rough at
+        /// a smaller scale, as readings come and go at edges.
+        const WIDE: f64 = 0.08;
+        let at = |log: f64| Some(self.at(evidence, settings, log)? - base);
+        let (low, high) = (at(self.middle - WIDE)?, at(self.middle + WIDE)?);
+        let bend = (high - 2.0 * self.gain + low) / (WIDE * WIDE);
+        Some((-bend).max(1e-9).sqrt().recip())
+    }
+
     /// The settings with the best factor and its error.
     pub(crate) fn refined(
         mut self,
@@ -218,16 +263,11 @@ impl Factor {
         settings: &[Setting],
         base: f64,
     ) -> Option<Refined> {
-        /// Logarithm of the factor to either side over which the log-likelihood's curvature tells the error: it is rough at
-        /// a smaller scale, as readings come and go at edges.
-        const WIDE: f64 = 0.08;
         self = self.best(evidence, settings, base)?;
-        let at = |log: f64| Some(self.at(evidence, settings, log)? - base);
-        let (low, high) = (at(self.middle - WIDE)?, at(self.middle + WIDE)?);
-        let bend = (high - 2.0 * self.gain + low) / (WIDE * WIDE);
+        let error = self.error(evidence, settings, base)?;
         Some(Refined {
             settings: self.beside(settings, self.middle),
-            standard_errors: vec![vec![self.middle.exp() / (-bend).max(1e-9).sqrt()]],
+            standard_errors: vec![vec![self.middle.exp() * error]],
             gain: self.gain,
             fitted: 1,
             by: By::Constant,

@@ -11,7 +11,7 @@ use super::detectable::detectable;
 use super::evidence::Evidence;
 use super::filter::{MEASURED, Trace};
 use super::leads::{By, Lead, leads, least_p, most, shortlist};
-use super::noise::{Factor, by_chance, noises, p_among, p_among_repeats, with_memory};
+use super::noise::{Factor, by_chance, detectable_noises, noises, p_among, p_among_repeats, with_memory};
 use super::pairs::Pair;
 use super::refine::jumps;
 use super::refined::{Refined, pursue};
@@ -151,6 +151,7 @@ impl<'a> Search<'a> {
     pub(super) fn alone(&mut self) -> Option<Vec<Lead>> {
         let leads = self.screen(&[])?.1.clone();
         self.detectable = detectable(&leads, &self.variants, ALARM);
+        (self.detectable).extend(detectable_noises(&self.evidence, self.total(), ALARM));
         let noise = noises(&self.evidence, &[], self.total());
         let by_mean = self.p_by_mean(&leads);
         self.p = by_mean.min(if by_mean < ALARM {
