@@ -7,7 +7,7 @@ use sim::Pattern;
 use super::answer::rivals;
 use super::document::distinct;
 use super::errors::Eq8;
-use super::limits::{decide_in_words, limits, next_experiment, next_in_words, stages};
+use super::limits::{decide_in_words, innovations, limits, next_experiment, next_in_words, stages};
 use super::unnamed::{in_words, unnamed};
 use super::{Trace, pictures};
 use crate::experiments::{Block, Picture, Section};
@@ -19,7 +19,7 @@ use crate::table::{Table, four_digits, probability, with_error, with_interval};
 /// # Errors
 /// Laps that cannot be compared.
 pub(crate) fn sections(trace: &Trace) -> Result<Vec<Section>> {
-    Ok(vec![
+    let sections = vec![
         Section {
             heading: "Diagnosis".into(),
             blocks: diagnosis(trace),
@@ -33,8 +33,8 @@ pub(crate) fn sections(trace: &Trace) -> Result<Vec<Section>> {
             blocks: candidates(trace),
         },
         Section {
-            heading: "Stage by stage".into(),
-            blocks: stages(trace),
+            heading: "What the logs leave".into(),
+            blocks: innovations(trace),
         },
         Section {
             heading: "Before and after".into(),
@@ -48,7 +48,39 @@ pub(crate) fn sections(trace: &Trace) -> Result<Vec<Section>> {
             heading: "What cannot be seen".into(),
             blocks: limits(trace),
         },
-    ])
+    ];
+    let with_content = |section: &Section| !section.blocks.is_empty();
+    Ok(sections.into_iter().filter(with_content).collect())
+}
+
+impl Trace {
+    /// All that a report of these sections says, each sentence once and without the pictures; what must be known of the data follows
+    /// the diagnosis.
+    pub(crate) fn text(&self, sections: &[Section]) -> String {
+        let mut text = String::new();
+        for (place, section) in sections.iter().enumerate() {
+            for block in &section.blocks {
+                match block {
+                    Block::Text(said) if !text.contains(said) => text += &format!("{said}\n"),
+                    Block::Table(table) => text += &format!("\n{}", table.to_text()),
+                    _ => {}
+                }
+            }
+            if place == 0 {
+                text.extend(
+                    self.remarks_besides()
+                        .map(|remark| format!("of the data: {remark}\n")),
+                );
+            }
+        }
+        text
+    }
+
+    /// What must be known of the data, but for what the summary says.
+    pub(super) fn remarks_besides(&self) -> impl Iterator<Item = &String> {
+        let said = summary(self);
+        self.remarks.iter().filter(move |remark| !said.contains(*remark))
+    }
 }
 
 /// A trace as a part of another report.
@@ -159,11 +191,11 @@ fn unexplained(trace: &Trace) -> String {
         );
     }
     let known = trace.answer.cause.as_ref().map(|cause| {
-        let stage = cause.stage.name();
-        match cause.depends_on.as_str() {
-            "chance" => format!(" It sits in the {stage} stage: noise of the {}.", cause.acts_on),
-            on => format!(" It sits in the {stage} stage: {} by {on}.", cause.acts_on),
-        }
+        format!(
+            " It sits in the {} stage: {}.",
+            cause.stage.name(),
+            cause_in_words(cause)
+        )
     });
     format!(
         "Unexplained: the data depart from the declared model, and no effect in the registry explains it. No name would be honest.{}",
@@ -171,8 +203,16 @@ fn unexplained(trace: &Trace) -> String {
     )
 }
 
+/// What a cause without a name acts on and depends on, for a sentence.
+pub(super) fn cause_in_words(cause: &Cause) -> String {
+    match cause.depends_on.as_str() {
+        "chance" => format!("noise of the {}", cause.acts_on),
+        on => format!("{} by {on}", cause.acts_on),
+    }
+}
+
 /// Effects with their sizes, one by one, for a sentence.
-fn described(trace: &Trace, effects: &[Candidate]) -> Vec<String> {
+pub(super) fn described(trace: &Trace, effects: &[Candidate]) -> Vec<String> {
     effects.iter().map(|effect| describe(trace, effect)).collect()
 }
 
@@ -229,11 +269,13 @@ fn size(effect: &Candidate) -> String {
     }
 }
 
+/// The answer, the verdict by stage where there are logs, and the error.
 fn diagnosis(trace: &Trace) -> Vec<Block> {
     let mut blocks: Vec<Block> = summary(trace)
         .lines()
         .map(|l| Block::Text(l.to_owned()))
         .collect();
+    blocks.splice(1..1, stages(trace));
     blocks.push(Block::Table(error_table(trace)));
     blocks
 }
@@ -321,7 +363,11 @@ fn residual(trace: &Trace) -> Vec<Block> {
 
 fn candidates(trace: &Trace) -> Vec<Block> {
     if trace.answer.explanations.is_empty() {
-        return vec![Block::Text("Nothing had to be tried.".into())];
+        let tried = match trace.answer.verdict {
+            Verdict::Faithful => "Nothing had to be tried.",
+            _ => "No effect was tried.",
+        };
+        return vec![Block::Text(tried.into())];
     }
     let source = trace.source();
     let further = trace.answer.further();
