@@ -222,14 +222,16 @@ pub(super) fn stages(trace: &Trace) -> Vec<Block> {
     }
     let mut blocks = vec![Block::Table(table)];
     if !matches!(logs.decide, Decided::NoController { .. }) {
-        let agree = if found.confirmed {
-            "The laps agree."
-        } else {
-            "The laps do not agree with what the logs say: both are shown and neither is claimed."
+        let agree = match (found.confirmed, trace.answer.verdict) {
+            (false, _) => {
+                " The laps do not agree with what the logs say: both are shown and neither is claimed."
+            }
+            (true, Verdict::Unexplained) => "",
+            (true, _) => " The laps agree.",
         };
         blocks.push(Block::Text(format!(
             "{} control steps were followed by a filter over the pose that takes the camera and all readings; the probability of as \
-             much by chance is {}. {agree}",
+             much by chance is {}.{agree}",
             logs.steps,
             probability(logs.p)
         )));

@@ -37,7 +37,10 @@ pub(crate) fn sections(trace: &Trace) -> Result<Vec<Section>> {
             blocks: innovations(trace),
         },
         Section {
-            heading: "Before and after".into(),
+            heading: match trace.answer.claimed() {
+                Some(_) => "Before and after".into(),
+                None => "Measured and simulated".into(),
+            },
             blocks: before_and_after(trace),
         },
         Section {
@@ -135,11 +138,19 @@ pub(crate) fn summary(trace: &Trace) -> String {
     };
     let further = further_in_words(trace);
     let next = next_in_words(trace).map_or(String::new(), |next| format!("\n{next}"));
+    format!("{said}{alternatives}{further}{next}\n{}", error_in_words(trace))
+}
+
+/// How far the simulation is from the robot.
+fn error_in_words(trace: &Trace) -> String {
+    let before_mm = MM * trace.mean_m(|e| &e.before_m);
+    let after = match trace.answer.claimed() {
+        Some(_) => format!(" before, {:.2} mm after", MM * trace.mean_m(|e| &e.after_m)),
+        None => String::new(),
+    };
     format!(
-        "{said}{alternatives}{further}{next}\nError of the mean lap on {}: {:.2} mm before, {:.2} mm after; {:.2} mm would be chance.",
+        "Error of the mean lap on {}: {before_mm:.2} mm{after}; {:.2} mm would be chance.",
         trace.judged_runs(),
-        MM * trace.mean_m(|e| &e.before_m),
-        MM * trace.mean_m(|e| &e.after_m),
         MM * trace.mean_m(|e| &e.floor_m)
     )
 }
@@ -190,7 +201,7 @@ fn unexplained(trace: &Trace) -> String {
             decide_in_words(&found.logs.decide, &trace.recordings)
         );
     }
-    let known = trace.answer.cause.as_ref().map(|cause| {
+    let stage = trace.answer.cause.as_ref().map(|cause| {
         format!(
             " It sits in the {} stage: {}.",
             cause.stage.name(),
@@ -198,9 +209,51 @@ fn unexplained(trace: &Trace) -> String {
         )
     });
     format!(
-        "Unexplained: the data depart from the declared model, and no effect in the registry explains it. No name would be honest.{}",
-        known.unwrap_or_default()
+        "Unexplained: the data depart from the declared model, and no name would be honest.{}{}",
+        stage.unwrap_or_default(),
+        best_listed(trace).unwrap_or_default()
     )
+}
+
+/// How much the best explanation by listed effects explains, and why it is not claimed; `None` where none was fitted.
+fn best_listed(trace: &Trace) -> Option<String> {
+    const NOISE: [&str; 4] = ["slip-level", "slip-memory", "reading-noise", "camera-noise"];
+    let answer = &trace.answer;
+    let is_listed = |e: &&Explanation| {
+        e.effects
+            .iter()
+            .all(|effect| Cause::of(&effect.setting).is_none())
+    };
+    let best = answer.explanations.iter().find(is_listed)?;
+    let stalls = (answer.explanations[..answer.indistinguishable].iter())
+        .find(|e| is_listed(e) && e.effects.len() == 2 && e.names().contains(&"wheel-scale"))
+        .filter(|e| e.names().contains(&"slip-level"));
+    let noises = best.names().iter().filter(|name| NOISE.contains(name)).count();
+    let why = match (&answer.cause, best.remainder_p.filter(|_| !best.fits())) {
+        (Some(cause), _) if cause.depends_on == "chance" && stalls.is_some() => {
+            "but a slower wheel and more slip are what a wheel does that stands still now and then: one cause without a name rather \
+             than two with theirs"
+                .to_owned()
+        }
+        (Some(_), _) => "but what it leaves shows a cause without a name".to_owned(),
+        _ if noises > 1 => {
+            "but with several effects on noise, which are more likely one cause without a name".to_owned()
+        }
+        (None, Some(p)) => format!(
+            "but leaves a remainder that is significant and too large for it to be claimed (p {})",
+            probability(p)
+        ),
+        (None, None) => "but of so weak a signal chance explains as much".to_owned(),
+    };
+    let explains = match best.explained(trace.laps_alone()) {
+        Some(share) => format!("explains {:.1} % of the excess", 100.0 * share),
+        None => format!("gains {:.1} units of log-likelihood", best.gain),
+    };
+    let fitted = answer.explanations.iter().filter(is_listed).count();
+    Some(format!(
+        " The best of {fitted} explanations by listed effects that were fitted, {}, {explains}, {why}.",
+        best.label()
+    ))
 }
 
 /// What a cause without a name acts on and depends on, for a sentence.
@@ -281,9 +334,16 @@ fn diagnosis(trace: &Trace) -> Vec<Block> {
 }
 
 fn error_table(trace: &Trace) -> Table {
+    // Where nothing is added after is before.
+    let of_answer = |[what, before, after, chance]: [String; 4]| match trace.answer.claimed() {
+        Some(_) => vec![what, before, after, chance],
+        None => vec![what, before, chance],
+    };
+    let before = trace.answer.claimed().map_or("declared model", |_| "before");
+    let columns = of_answer(["", before, "after", "chance"].map(String::from));
     let mut table = Table::new(
         format!("The simulation against {}", trace.judged_runs()),
-        &["", "before", "after", "chance"],
+        &columns.iter().map(String::as_str).collect::<Vec<_>>(),
     );
     let mm = |m: f64| format!("{:.2}", MM * m);
     for errors in &trace.errors {
@@ -292,59 +352,72 @@ fn error_table(trace: &Trace) -> Table {
             _ => format!("{}: ", trace.recordings[errors.recording].measured.set.name),
         };
         let mean_mm = |values: &[f64]| mm(values.iter().sum::<f64>() / values.len() as f64);
-        table.push([
+        table.push(of_answer([
             format!("{of}mean lap, rms over the gates, mm"),
             mean_mm(&errors.before_m),
             mean_mm(&errors.after_m),
             mean_mm(&errors.floor_m),
-        ]);
+        ]));
         let measured_s = errors.measured_lap_s();
         let [before, after] = errors
             .simulated_lap_s()
             .map(|s| format!("{:+.2}", s - measured_s));
-        table.push([format!("{of}lap time, s off"), before, after, "0".into()]);
+        table.push(of_answer([
+            format!("{of}lap time, s off"),
+            before,
+            after,
+            "0".into(),
+        ]));
         if let Some(starts) = &errors.starts {
             let [before, after, chance] = starts.errors_mm().map(|mm| format!("{mm:.2}"));
-            table.push([format!("{of}start of runs, rms, mm"), before, after, chance]);
+            table.push(of_answer([
+                format!("{of}start of runs, rms, mm"),
+                before,
+                after,
+                chance,
+            ]));
         }
         for Eq8 { modes, before, after } in errors.eq_8() {
             let [before, after] = [before, after].map(|d| d.map_or("-".into(), |d| format!("{d:.2}")));
-            table.push([format!("{of}eq. 8 in {modes} modes"), before, after, "-".into()]);
+            table.push(of_answer([
+                format!("{of}eq. 8 in {modes} modes"),
+                before,
+                after,
+                "-".into(),
+            ]));
         }
     }
     table
 }
 
 fn residual(trace: &Trace) -> Vec<Block> {
-    let answer = trace.answer.explanations.first();
-    let mut table = Table::new(
-        "What the laps hold beyond the expectation of the declared model, and of the model with the answer (excess: squared deviations in \
-         units of chance, less as many as chance makes)",
-        &["part", "freedom", "excess", "p", "with the answer", "p with it"],
-    );
-    let words = [
+    const WORDS: [&str; 5] = [
         "mean lap",
         "run to run",
         "drift within runs",
         "noise",
         "start of runs",
     ];
-    let named = |numbers: &Departures| {
-        words
-            .into_iter()
-            .zip(numbers.named().into_iter().map(|of| of.1))
-            .collect::<Vec<_>>()
-    };
+    let claimed = trace.answer.claimed();
+    let left = claimed.and_then(|claimed| claimed.remainder.as_ref().map(Departures::named));
+    let and_answer = left.as_ref().map_or("", |_| ", and of the model with the answer");
+    let mut columns = vec!["part", "freedom", "excess", "p"];
+    columns.extend(left.iter().flat_map(|_| ["with the answer", "p with it"]));
+    let mut table = Table::new(
+        format!(
+            "What the laps hold beyond the expectation of the declared model{and_answer} (excess: squared deviations in units of chance, \
+             less as many as chance makes)"
+        ),
+        &columns,
+    );
     // What rounds to nothing has no sign.
-    let shown = |q: Quadratic| [format!("{:.0}", q.excess().round() + 0.0), probability(q.p)];
-    let remainder = answer.and_then(|answer| answer.remainder.as_ref()).map(named);
-    for (i, (name, declared)) in named(&trace.residual).into_iter().enumerate() {
-        let left = (remainder.as_ref()).map_or(["-".into(), "-".into()], |left| shown(left[i].1));
-        let row = [name.to_owned(), declared.freedom.to_string()];
-        if declared.freedom == 0 {
-            table.push(row.into_iter().chain(["-"; 4].map(String::from)));
-            continue;
-        }
+    let shown = |q: Quadratic| match q.freedom {
+        0 => ["-".to_owned(), "-".to_owned()],
+        _ => [format!("{:.0}", q.excess().round() + 0.0), probability(q.p)],
+    };
+    for (i, (word, (_, declared))) in WORDS.into_iter().zip(trace.residual.named()).enumerate() {
+        let row = [word.to_owned(), declared.freedom.to_string()];
+        let left = left.iter().flat_map(|left| shown(left[i].1));
         table.push(row.into_iter().chain(shown(declared)).chain(left));
     }
     let of = of_shown(trace);
@@ -365,7 +438,7 @@ fn candidates(trace: &Trace) -> Vec<Block> {
     if trace.answer.explanations.is_empty() {
         let tried = match trace.answer.verdict {
             Verdict::Faithful => "Nothing had to be tried.",
-            _ => "No effect was tried.",
+            _ => "No explanation could be fitted.",
         };
         return vec![Block::Text(tried.into())];
     }
@@ -448,34 +521,45 @@ fn of_shown(trace: &Trace) -> String {
 
 fn before_and_after(trace: &Trace) -> Vec<Block> {
     let of = of_shown(trace);
+    let [with_answer, left, right] = match trace.answer.claimed() {
+        Some(_) => [
+            ", and with the answer",
+            "each of the two leaves of the measured mean lap",
+            " Where the answer is right, 95 of 100 bars reach its line.",
+        ],
+        None => [
+            "",
+            "it leaves of the measured mean lap",
+            " Where the model is right, 95 of 100 bars reach its line.",
+        ],
+    };
     let mut blocks = vec![
         Picture::block(
             "mean_laps",
             "Fig. B",
             format!(
-                "Mean position at each gate: measured, simulated with the declared model, and with the answer. Below, what each of \
-                 the two leaves of the measured mean lap; in the band, 95 of 100 gates lie by chance. The mean over all runs is nearer \
-                 to both than single runs, whose errors the table has.{of}"
+                "Mean position at each gate: measured, simulated with the declared model{with_answer}. Below, what {left}; in the \
+                 band, 95 of 100 gates lie by chance. The mean over all runs is nearer to the simulation than single runs, whose \
+                 errors the table has.{of}"
             ),
             pictures::mean_laps(trace),
         ),
         Picture::block(
             "laps",
             "Fig. C",
-            format!("Laps of the declared model and with the answer, over measured ones.{of}"),
+            format!("Laps of the declared model{with_answer}, over measured ones.{of}"),
             pictures::laps(trace),
         ),
     ];
-    if let Some(starts) = &trace.shown().1.starts {
+    if let Some(starts) = pictures::starts(trace) {
         blocks.push(Picture::block(
             "starts",
             "Fig. D",
             format!(
                 "How runs start: how far the robot is ahead of where it would be had it always been as fast as in the second after, on \
-                 average over the runs. One that sets off late is ahead at first, for it then falls behind. Where the answer is right, 95 of \
-                 100 bars reach its line.{of}"
+                 average over the runs. One that sets off late is ahead at first, for it then falls behind.{right}{of}"
             ),
-            pictures::starts(starts),
+            starts,
         ));
     }
     blocks
