@@ -87,10 +87,37 @@ pub(crate) fn next_in_words(trace: &Trace) -> Option<String> {
     ))
 }
 
+/// Why there is no next experiment.
+fn no_experiment(trace: &Trace) -> String {
+    let answer = &trace.answer;
+    let Some(claimed) = answer.claimed() else {
+        return match answer.verdict {
+            Verdict::Faithful => "There is nothing to tell apart.".to_owned(),
+            _ => "Nothing is claimed, and no experiment was looked for.".to_owned(),
+        };
+    };
+    let others = rivals(answer).iter().skip(1).chain(answer.further());
+    let others = others.filter(|other| other.names() != claimed.names());
+    let others = distinct(others.map(Explanation::label));
+    if others.is_empty() {
+        return "There is nothing to tell apart.".to_owned();
+    }
+    let with_log = trace.from_logs.as_ref().map_or(
+        ", and laps as they are with the robot's log of readings and commands",
+        |_| ", each with the robot's log of readings and commands",
+    );
+    format!(
+        "None of the experiments that were looked at is expected to tell {} from {}: more laps as they are, laps the other way round, \
+         with another gain or threshold of the controller and at another speed{with_log}.",
+        claimed.label(),
+        others.join("; ")
+    )
+}
+
 /// The experiments that would tell rivals apart.
 pub(super) fn next_experiment(trace: &Trace) -> Vec<Block> {
     if trace.experiments.is_empty() {
-        return vec![Block::Text("There is nothing to tell apart.".into())];
+        return vec![Block::Text(no_experiment(trace))];
     }
     let mut blocks: Vec<Block> = next_in_words(trace).into_iter().map(Block::Text).collect();
     let mut table = Table::new(
