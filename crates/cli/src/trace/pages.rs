@@ -8,6 +8,7 @@ use super::answer::rivals;
 use super::document::distinct;
 use super::errors::Eq8;
 use super::limits::{decide_in_words, innovations, limits, next_experiment, next_in_words, stages};
+use super::remarks::sizes_by_run_in_words;
 use super::unnamed::{in_words, unnamed};
 use super::{Trace, pictures};
 use crate::experiments::{Block, Picture, Section};
@@ -148,8 +149,9 @@ fn error_in_words(trace: &Trace) -> String {
         Some(_) => format!(" before, {:.2} mm after", MM * trace.mean_m(|e| &e.after_m)),
         None => String::new(),
     };
+    let by_run = sizes_by_run_in_words(&trace.answer).map_or(String::new(), |words| format!(" {words}"));
     format!(
-        "Error of the mean lap on {}: {before_mm:.2} mm{after}; {:.2} mm would be chance.",
+        "Error of the mean lap on {}: {before_mm:.2} mm{after}; {:.2} mm would be chance.{by_run}",
         trace.judged_runs(),
         MM * trace.mean_m(|e| &e.floor_m)
     )
