@@ -236,16 +236,17 @@ impl Traced {
             Err(why) => return vec![Block::Text(format!("These laps cannot be traced: {why}."))],
         };
         let mut blocks = digest(trace);
-        for block in &mut blocks {
-            if let Block::Picture(picture) = block {
-                let letter = if self.controller == ControllerKind::Braitenberg {
-                    "T"
-                } else {
-                    "U"
-                };
-                picture.file = format!("trace_{}_{}", self.name(), picture.file);
-                picture.number = format!("Fig. {letter}");
-            }
+        let letter = match self.controller {
+            ControllerKind::Braitenberg => "T",
+            ControllerKind::RuleBased => "U",
+        };
+        let pictures = blocks.iter_mut().filter_map(|block| match block {
+            Block::Picture(picture) => Some(picture),
+            _ => None,
+        });
+        for (place, picture) in (1..).zip(pictures) {
+            picture.file = format!("trace_{}_{}", self.name(), picture.file);
+            picture.number = format!("Fig. {letter}{place}");
         }
         blocks
     }

@@ -15,7 +15,7 @@ use crate::experiments::{Block, Picture, Section};
 use crate::figures::MM;
 use crate::table::{Table, four_digits, probability, with_error, with_interval};
 
-/// The sections of a trace.
+/// The sections of a trace, with figures numbered as they come.
 ///
 /// # Errors
 /// Laps that cannot be compared.
@@ -54,7 +54,16 @@ pub(crate) fn sections(trace: &Trace) -> Result<Vec<Section>> {
         },
     ];
     let with_content = |section: &Section| !section.blocks.is_empty();
-    Ok(sections.into_iter().filter(with_content).collect())
+    let mut sections: Vec<Section> = sections.into_iter().filter(with_content).collect();
+    let blocks = sections.iter_mut().flat_map(|section| &mut section.blocks);
+    let pictures = blocks.filter_map(|block| match block {
+        Block::Picture(picture) => Some(picture),
+        _ => None,
+    });
+    for (letter, picture) in ('A'..='Z').zip(pictures) {
+        picture.number = format!("Fig. {letter}");
+    }
+    Ok(sections)
 }
 
 impl Trace {
@@ -427,7 +436,7 @@ fn residual(trace: &Trace) -> Vec<Block> {
         Block::Table(table),
         Picture::block(
             "residual_map",
-            "Fig. A",
+            "",
             format!(
                 "Where the residual sits: the mean measured lap, coloured by its distance from the declared model's.{of}"
             ),
@@ -538,7 +547,7 @@ fn before_and_after(trace: &Trace) -> Vec<Block> {
     let mut blocks = vec![
         Picture::block(
             "mean_laps",
-            "Fig. B",
+            "",
             format!(
                 "Mean position at each gate: measured, simulated with the declared model{with_answer}. Below, what {left}; in the \
                  band, 95 of 100 gates lie by chance. The mean over all runs is nearer to the simulation than single runs, whose \
@@ -548,7 +557,7 @@ fn before_and_after(trace: &Trace) -> Vec<Block> {
         ),
         Picture::block(
             "laps",
-            "Fig. C",
+            "",
             format!("Laps of the declared model{with_answer}, over measured ones.{of}"),
             pictures::laps(trace),
         ),
@@ -556,7 +565,7 @@ fn before_and_after(trace: &Trace) -> Vec<Block> {
     if let Some(starts) = pictures::starts(trace) {
         blocks.push(Picture::block(
             "starts",
-            "Fig. D",
+            "",
             format!(
                 "How runs start: how far the robot is ahead of where it would be had it always been as fast as in the second after, on \
                  average over the runs. One that sets off late is ahead at first, for it then falls behind.{right}{of}"

@@ -33,7 +33,7 @@ pub(super) fn unnamed(trace: &Trace) -> Option<Block> {
         "What the robot does and the model does not: change of the {} over the {}.",
         cause.acts_on, cause.depends_on
     );
-    Some(Picture::block("unlisted", "Fig. D", caption, figure))
+    Some(Picture::block("unlisted", "", caption, figure))
 }
 
 /// A cause without a name with what is known of it, for a sentence.
