@@ -401,14 +401,16 @@ fn error_table(trace: &Trace) -> Table {
     table
 }
 
+/// The numbers that tell how laps depart, in words.
+const NUMBERS: [&str; 5] = [
+    "mean lap",
+    "run to run",
+    "drift within runs",
+    "noise",
+    "start of runs",
+];
+
 fn residual(trace: &Trace) -> Vec<Block> {
-    const WORDS: [&str; 5] = [
-        "mean lap",
-        "run to run",
-        "drift within runs",
-        "noise",
-        "start of runs",
-    ];
     let claimed = trace.answer.claimed();
     let left = claimed.and_then(|claimed| claimed.remainder.as_ref().map(Departures::named));
     let and_answer = left.as_ref().map_or("", |_| ", and of the model with the answer");
@@ -426,7 +428,7 @@ fn residual(trace: &Trace) -> Vec<Block> {
         0 => ["-".to_owned(), "-".to_owned()],
         _ => [format!("{:.0}", q.excess().round() + 0.0), probability(q.p)],
     };
-    for (i, (word, (_, declared))) in WORDS.into_iter().zip(trace.residual.named()).enumerate() {
+    for (i, (word, (_, declared))) in NUMBERS.into_iter().zip(trace.residual.named()).enumerate() {
         let row = [word.to_owned(), declared.freedom.to_string()];
         let left = left.iter().flat_map(|left| shown(left[i].1));
         table.push(row.into_iter().chain(shown(declared)).chain(left));
@@ -438,11 +440,54 @@ fn residual(trace: &Trace) -> Vec<Block> {
             "residual_map",
             "",
             format!(
-                "Where the residual sits: the mean measured lap, coloured by its distance from the declared model's.{of}"
+                "Where the residual sits: the mean measured lap, coloured by its distance from the declared model's.{} Pale is within \
+                 chance.{of}",
+                departures_in_words(trace)
             ),
             pictures::residual_map(trace),
         ),
     ]
+}
+
+/// How much of the mean lap's path departs from the declared model, and what else does, which a map does not show.
+fn departures_in_words(trace: &Trace) -> String {
+    /// Share of gates outside of the band for 95 of 100 that is no chance: neighbours go together.
+    const MANY: f64 = 0.15;
+    let departing = trace.residual.departing();
+    let pairs = pictures::residual_mm(trace)
+        .into_iter()
+        .zip(pictures::chance_mm(trace));
+    let (gates, outside) = pairs.fold((0, 0), |(gates, outside), (mm, chance_mm)| {
+        (gates + 1, outside + usize::from(mm.abs() > chance_mm))
+    });
+    let path_departs = departing.contains(&"mean") && outside as f64 > MANY * f64::from(gates);
+    let path = if path_departs {
+        format!(" It is farther than chance leaves 95 of 100 at {outside} of {gates} gates.")
+    } else {
+        " Nothing here exceeds chance.".to_owned()
+    };
+    let errors = trace.shown().1;
+    let later_s = errors.measured_lap_s() - errors.simulated_lap_s()[0];
+    let times = (departing.contains(&"mean") && !path_departs)
+        .then(|| format!("the times of the mean lap (it takes {later_s:+.2} s)"));
+    let others = NUMBERS.into_iter().zip(trace.residual.named()).skip(1);
+    let others = others.filter(|(_, (name, _))| departing.contains(name));
+    let others = others.map(|(word, (_, number))| {
+        format!(
+            "{word} (excess {:.0}, p {})",
+            number.excess(),
+            probability(number.p)
+        )
+    });
+    let unseen: Vec<String> = times.into_iter().chain(others).collect();
+    if unseen.is_empty() {
+        path
+    } else {
+        format!(
+            "{path} What departs besides and is not in the map: {}.",
+            unseen.join(", ")
+        )
+    }
 }
 
 fn candidates(trace: &Trace) -> Vec<Block> {

@@ -32,21 +32,35 @@ fn simulated<T>(trace: &Trace, before: T, after: T) -> Vec<(&'static str, T, Sty
     std::iter::once(declared).chain(claimed).collect()
 }
 
-/// Where on the circuit the residual sits.
-pub(super) fn residual_map(trace: &Trace) -> Figure {
+/// How far the mean measured lap is from the declared model's, gate by gate, mm (left: positive).
+pub(super) fn residual_mm(trace: &Trace) -> Vec<f64> {
     let (recording, errors) = trace.shown();
+    let pairs = mean_measured(recording).into_iter().zip(errors.before.mean_m());
+    pairs
+        .map(|(measured, simulated)| MM * (measured - simulated))
+        .collect()
+}
+
+/// Within which distance of the simulation the mean measured lap is by chance at 95 of 100 gates, gate by gate, mm.
+pub(super) fn chance_mm(trace: &Trace) -> Vec<f64> {
+    let (recording, errors) = trace.shown();
+    let errors_m = errors.after.standard_error_m(&recording.shape());
+    errors_m.into_iter().map(|error_m| 1.96 * MM * error_m).collect()
+}
+
+/// Where on the circuit the residual sits; what is within chance is pale.
+pub(super) fn residual_map(trace: &Trace) -> Figure {
+    /// Reach of the colours as a multiple of what is within chance.
+    const REACH: f64 = 4.0;
+    let recording = trace.shown().0;
     let circuit = recording.setup.scene.circuit();
-    let measured = mean_measured(recording);
-    let mut points = crossings(circuit, &measured);
-    let mut values: Vec<f64> = measured
-        .iter()
-        .zip(errors.before.mean_m())
-        .map(|(m, s)| MM * (m - s))
-        .collect();
+    let mut points = crossings(circuit, &mean_measured(recording));
+    let mut values = residual_mm(trace);
+    let least = REACH * chance_mm(trace).into_iter().fold(0.0, f64::max);
     points.push(points[0]);
     values.push(values[0]);
     let label = "measured less simulated, mm (left: positive)";
-    let panel = colored_path(circuit, points, values, label, 0.1);
+    let panel = colored_path(circuit, points, values, label, least);
     single(
         "Residual map",
         "The mean measured lap, coloured by its distance from the declared model's mean lap.",
@@ -66,14 +80,12 @@ pub(super) fn mean_laps(trace: &Trace) -> Figure {
     };
     let mut below = across(&simulated.iter().map(left).collect::<Vec<_>>());
     below.y = Axis::linear("measured less simulated, mm");
-    let band = |(gate, error_m): (usize, f64)| Interval {
+    let band = |(gate, chance_mm): (usize, f64)| Interval {
         at: gate as f64,
-        low: -1.96 * MM * error_m,
-        high: 1.96 * MM * error_m,
+        low: -chance_mm,
+        high: chance_mm,
     };
-    let shape = recording.shape();
-    let errors_m = errors.after.standard_error_m(&shape);
-    let chance = errors_m.into_iter().enumerate().map(band).collect();
+    let chance = chance_mm(trace).into_iter().enumerate().map(band).collect();
     let style = Style::color(Color::INK);
     below
         .marks
