@@ -401,6 +401,12 @@ fn error_table(trace: &Trace) -> Table {
     table
 }
 
+/// What stands below the table of these numbers.
+const NUMBERS_EXPLAINED: &str = "Mean lap: its position at each gate and its times; run to run: how the means of runs differ; drift: how \
+    laps change along a run; noise: how single laps scatter about that, where and how roughly; start: how runs set off. Freedom: of how \
+    many numbers each is told. Excess: the sum of their squared deviations in units of chance, less the freedom, which is what chance \
+    makes of it on average: about 0, and as often below, where the model is right. p: the probability of as much by chance.";
+
 /// The numbers that tell how laps depart, in words.
 const NUMBERS: [&str; 5] = [
     "mean lap",
@@ -417,10 +423,7 @@ fn residual(trace: &Trace) -> Vec<Block> {
     let mut columns = vec!["part", "freedom", "excess", "p"];
     columns.extend(left.iter().flat_map(|_| ["with the answer", "p with it"]));
     let mut table = Table::new(
-        format!(
-            "What the laps hold beyond the expectation of the declared model{and_answer} (excess: squared deviations in units of chance, \
-             less as many as chance makes)"
-        ),
+        format!("What the laps hold beyond the expectation of the declared model{and_answer}"),
         &columns,
     );
     // What rounds to nothing has no sign.
@@ -433,15 +436,17 @@ fn residual(trace: &Trace) -> Vec<Block> {
         let left = left.iter().flat_map(|left| shown(left[i].1));
         table.push(row.into_iter().chain(shown(declared)).chain(left));
     }
+    let with_answer = claimed.map_or("", |_| " of the model with the answer");
     let of = of_shown(trace);
     vec![
         Block::Table(table),
+        Block::Text(NUMBERS_EXPLAINED.into()),
         Picture::block(
             "residual_map",
             "",
             format!(
                 "Where the residual sits: the mean measured lap, coloured by its distance from the declared model's.{} Pale is within \
-                 chance.{of}",
+                 chance{with_answer}.{of}",
                 departures_in_words(trace)
             ),
             pictures::residual_map(trace),
@@ -454,9 +459,9 @@ fn departures_in_words(trace: &Trace) -> String {
     /// Share of gates outside of the band for 95 of 100 that is no chance: neighbours go together.
     const MANY: f64 = 0.15;
     let departing = trace.residual.departing();
-    let pairs = pictures::residual_mm(trace)
-        .into_iter()
-        .zip(pictures::chance_mm(trace));
+    let errors = trace.shown().1;
+    let chance_mm = pictures::chance_mm(trace, &errors.before);
+    let pairs = pictures::residual_mm(trace).into_iter().zip(chance_mm);
     let (gates, outside) = pairs.fold((0, 0), |(gates, outside), (mm, chance_mm)| {
         (gates + 1, outside + usize::from(mm.abs() > chance_mm))
     });
@@ -466,10 +471,15 @@ fn departures_in_words(trace: &Trace) -> String {
     } else {
         " Nothing here exceeds chance.".to_owned()
     };
-    let errors = trace.shown().1;
     let later_s = errors.measured_lap_s() - errors.simulated_lap_s()[0];
-    let times = (departing.contains(&"mean") && !path_departs)
-        .then(|| format!("the times of the mean lap (it takes {later_s:+.2} s)"));
+    let than = if later_s > 0.0 { "longer" } else { "shorter" };
+    // Of several data sets the numbers are those of all, and the map is one's.
+    let times = (departing.contains(&"mean") && !path_departs && trace.recordings.len() == 1).then(|| {
+        format!(
+            "the times of the mean lap (measured laps take {:.2} s {than})",
+            later_s.abs()
+        )
+    });
     let others = NUMBERS.into_iter().zip(trace.residual.named()).skip(1);
     let others = others.filter(|(_, (name, _))| departing.contains(name));
     let others = others.map(|(word, (_, number))| {

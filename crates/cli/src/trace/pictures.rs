@@ -41,22 +41,21 @@ pub(super) fn residual_mm(trace: &Trace) -> Vec<f64> {
         .collect()
 }
 
-/// Within which distance of the simulation the mean measured lap is by chance at 95 of 100 gates, gate by gate, mm.
-pub(super) fn chance_mm(trace: &Trace) -> Vec<f64> {
-    let (recording, errors) = trace.shown();
-    let errors_m = errors.after.standard_error_m(&recording.shape());
+/// Within which distance of a simulation as many laps of the same model are by chance at 95 of 100 gates, gate by gate, mm.
+pub(super) fn chance_mm(trace: &Trace, simulated: &MeanLaps) -> Vec<f64> {
+    let errors_m = simulated.standard_error_m(&trace.shown().0.shape());
     errors_m.into_iter().map(|error_m| 1.96 * MM * error_m).collect()
 }
 
-/// Where on the circuit the residual sits; what is within chance is pale.
+/// Where on the circuit the residual sits; what is within chance, with the answer if there is one, is pale.
 pub(super) fn residual_map(trace: &Trace) -> Figure {
     /// Reach of the colours as a multiple of what is within chance.
     const REACH: f64 = 4.0;
-    let recording = trace.shown().0;
+    let (recording, errors) = trace.shown();
     let circuit = recording.setup.scene.circuit();
     let mut points = crossings(circuit, &mean_measured(recording));
     let mut values = residual_mm(trace);
-    let least = REACH * chance_mm(trace).into_iter().fold(0.0, f64::max);
+    let least = REACH * chance_mm(trace, &errors.after).into_iter().fold(0.0, f64::max);
     points.push(points[0]);
     values.push(values[0]);
     let label = "measured less simulated, mm (left: positive)";
@@ -85,7 +84,11 @@ pub(super) fn mean_laps(trace: &Trace) -> Figure {
         low: -chance_mm,
         high: chance_mm,
     };
-    let chance = chance_mm(trace).into_iter().enumerate().map(band).collect();
+    let chance = chance_mm(trace, &errors.after)
+        .into_iter()
+        .enumerate()
+        .map(band)
+        .collect();
     let style = Style::color(Color::INK);
     below
         .marks
