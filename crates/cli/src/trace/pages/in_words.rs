@@ -165,7 +165,8 @@ fn best_listed(trace: &Trace) -> Option<String> {
             "but leaves a remainder that is significant and too large for it to be claimed (p {})",
             probability(p)
         ),
-        (None, None) => "but of so weak a signal chance explains as much".to_owned(),
+        (None, None) if best.fits() => "but of so weak a signal chance explains as much".to_owned(),
+        (None, None) => "too little to be claimed".to_owned(),
     };
     let explains = match best.explained(trace.laps_alone()) {
         Some(share) => format!("explains {:.1} % of the excess", 100.0 * share),
