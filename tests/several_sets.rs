@@ -187,7 +187,8 @@ fn a_size_by_run_is_known_where_there_are_logs_and_judged_by_their_laps() {
     near(&found, &[20.0, 0.0, 10.0, 10.0]);
     let said = "seen has no logs: its laps judge what the other data sets' logs say, unless sizes go by run.";
     let by_run = "The size of directional-light differs from run to run: that of a run which is held out is not known, and the mean of \
-                  the others stands for it. The error after is that of such a run; model.after.toml has each run's own size.";
+                  the others stands for it. The error after is that of such a run and may be larger than before; model.after.toml has \
+                  each run's own size.";
     assert_eq!(found["remarks"], serde_json::json!([said, by_run]));
 }
 

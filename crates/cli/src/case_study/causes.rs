@@ -67,8 +67,10 @@ enum Presence {
     Open,
     /// Tried, and the answer explains the laps without it.
     NotNeeded,
-    /// The search did not come to it, or nothing was searched.
+    /// Nothing departs from the declared model, so nothing was searched.
     NotSeen,
+    /// The search did not come to it, or there is no trace.
+    NotTried,
 }
 
 /// What the traces say of a cause.
@@ -93,7 +95,7 @@ pub(super) fn find(traces: &[(&'static str, Option<&Trace>)]) -> Vec<Finding> {
                 .iter()
                 .map(|(_, (presence, _))| *presence)
                 .min()
-                .unwrap_or(Presence::NotSeen),
+                .unwrap_or(Presence::NotTried),
             said: looked.into_iter().map(|(name, (_, said))| (name, said)).collect(),
         }
     };
@@ -116,8 +118,14 @@ impl Cause {
 
     fn look(&self, trace: Option<&Trace>) -> (Presence, String) {
         let Some(answer) = trace.map(|trace| &trace.answer) else {
-            return (Presence::NotSeen, "not traced".into());
+            return (Presence::NotTried, "not traced".into());
         };
+        if answer.verdict == Verdict::Faithful {
+            return (
+                Presence::NotSeen,
+                "not seen: these laps do not depart from the model".into(),
+            );
+        }
         let rivals = &answer.explanations[..answer.indistinguishable];
         let without = rivals.iter().find(|rival| !self.among(rival));
         if let Some(claimed) = answer.claimed().filter(|claimed| self.among(claimed)) {
@@ -135,7 +143,10 @@ impl Cause {
             };
         }
         let Some(tried) = answer.explanations.iter().find(|tried| self.among(tried)) else {
-            return (Presence::NotSeen, "not seen".into());
+            return (
+                Presence::NotTried,
+                "not tried: the search did not come to it".into(),
+            );
         };
         let label = tried.label();
         let behind = answer.explanations[0].score - tried.score;
@@ -199,7 +210,7 @@ impl Finding {
         match self.presence {
             Presence::Present => Some(true),
             Presence::NotNeeded => Some(false),
-            Presence::Open | Presence::NotSeen => None,
+            Presence::Open | Presence::NotSeen | Presence::NotTried => None,
         }
     }
 
@@ -209,6 +220,7 @@ impl Finding {
             Presence::Open => "open",
             Presence::NotNeeded => "not needed",
             Presence::NotSeen => "not seen",
+            Presence::NotTried => "not tried",
         }
     }
 
@@ -220,7 +232,7 @@ impl Finding {
             .collect();
         json!({
             "cause": self.cause.name, "effects": self.cause.effects,
-            "present": self.present(), "evidence": evidence.join("; "),
+            "present": self.present(), "finding": self.word(), "evidence": evidence.join("; "),
         })
     }
 
@@ -271,7 +283,7 @@ mod tests {
         assert!(
             found
                 .iter()
-                .all(|f| f.present().is_none() && f.word() == "not seen")
+                .all(|f| f.present().is_none() && f.word() == "not tried")
         );
         assert_eq!(
             found[0].json()["evidence"],

@@ -162,7 +162,8 @@ const EFFECTS_ADDED: &str = "The simulations of Tables II and III once more, wit
 const CAUSES: &str = "Section IV-C names what the paper's simulation leaves out. Each of these causes stands here with the \
     effects that lapwing knows for it and with what the traces say: it is in the answer, with its size and 95 % interval; \
     or it was tried, and how far its score (log-likelihood gained less the price of the fitted numbers) stays behind the \
-    answer's; or the search did not come to it, which says nothing about it.";
+    answer's; or nothing departs from the model, and it is not seen; or the search did not come to it (not tried), which says \
+    nothing about it.";
 
 /// Tables II and III with what the trace of the Braitenberg robot claims.
 fn again(session: &Session, study: &Study, traced: &Traced) -> Result<[BeforeAfter; 2]> {
@@ -236,16 +237,17 @@ impl Traced {
             Err(why) => return vec![Block::Text(format!("These laps cannot be traced: {why}."))],
         };
         let mut blocks = digest(trace);
-        for block in &mut blocks {
-            if let Block::Picture(picture) = block {
-                let letter = if self.controller == ControllerKind::Braitenberg {
-                    "T"
-                } else {
-                    "U"
-                };
-                picture.file = format!("trace_{}_{}", self.name(), picture.file);
-                picture.number = format!("Fig. {letter}");
-            }
+        let letter = match self.controller {
+            ControllerKind::Braitenberg => "T",
+            ControllerKind::RuleBased => "U",
+        };
+        let pictures = blocks.iter_mut().filter_map(|block| match block {
+            Block::Picture(picture) => Some(picture),
+            _ => None,
+        });
+        for (place, picture) in (1..).zip(pictures) {
+            picture.file = format!("trace_{}_{}", self.name(), picture.file);
+            picture.number = format!("Fig. {letter}{place}");
         }
         blocks
     }

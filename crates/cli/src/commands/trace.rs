@@ -10,7 +10,7 @@ use crate::output::{OutDir, Work};
 use crate::report::Report;
 use crate::session::Session;
 use crate::setup;
-use crate::trace::{Cache, Trace, document, gates_csv, sections, starts_csv, summary};
+use crate::trace::{Cache, Trace, document, gates_csv, sections, starts_csv};
 
 pub(crate) fn run(session: &Session, args: &args::Trace) -> Result<()> {
     let file = setup::model_file(&args.model)?;
@@ -41,16 +41,11 @@ pub(crate) fn run(session: &Session, args: &args::Trace) -> Result<()> {
     for (number, table) in sections.iter().flat_map(Section::tables).enumerate() {
         folder.write(&format!("tables/{:02}.csv", number + 1), table.to_csv())?;
     }
-    let text = summary(&trace);
+    let text = trace.text(&sections);
     let names: Vec<&str> = (trace.recordings.iter())
         .map(|recording| recording.measured.set.name.as_str())
         .collect();
     let title = format!("What the model lacks: {}", names.join(", "));
-    let tables: String = sections
-        .iter()
-        .flat_map(Section::tables)
-        .map(|table| table.to_text() + "\n")
-        .collect();
     folder.write(
         "report.html",
         Report {
@@ -64,11 +59,8 @@ pub(crate) fn run(session: &Session, args: &args::Trace) -> Result<()> {
     if args.json {
         return session.print_json(&document);
     }
-    let remarks: String = (trace.remarks.iter())
-        .map(|remark| format!("of the data: {remark}\n"))
-        .collect();
     session.print(&format!(
-        "{text}\n{remarks}\n{tables}report: {}\n",
+        "{text}\nreport: {}\n",
         args.out.join("report.html").display()
     ))
 }

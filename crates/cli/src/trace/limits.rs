@@ -2,11 +2,14 @@
 
 use std::collections::BTreeMap;
 
-use diagnose::{Decided, Detectable};
-use sim::Param;
+use diagnose::{Answer, Candidate, Decided, Detectable, Explanation, Verdict};
+use sim::{Param, Stage};
 
 use super::Trace;
+use super::answer::{FromLogs, rivals};
+use super::document::distinct;
 use super::next::{Experiment, MOST_LAPS};
+use super::pages::{cause_in_words, described};
 use super::recording::{Recording, files, runs};
 use crate::dataset::Log;
 use crate::experiments::Block;
@@ -77,17 +80,64 @@ pub(crate) fn next_in_words(trace: &Trace) -> Option<String> {
         Some(laps) => format!("about {laps} laps would do for 5 standard deviations"),
         None => format!("more than {MOST_LAPS} laps would be needed for 5 standard deviations"),
     };
+    let told: Vec<&str> = best.told().map(|(rival, _)| rival.as_str()).collect();
+    let what = if told.is_empty() || told.len() == best.separations.len() {
+        "them apart".to_owned()
+    } else {
+        format!("the answer from {}", told.join(" and from "))
+    };
+    let some_experiment_tells = |rival: &str| {
+        let mut told = trace.experiments.iter().flat_map(Experiment::told);
+        told.any(|(other, _)| other == rival)
+    };
+    let rivals = best.separations.iter().map(|(rival, _)| rival.as_str());
+    let never: Vec<&str> = rivals.filter(|rival| !some_experiment_tells(rival)).collect();
+    let never = if told.is_empty() || never.is_empty() {
+        String::new()
+    } else {
+        format!(
+            " None that was looked at tells it from {}.",
+            never.join(" or from ")
+        )
+    };
     Some(format!(
-        "To tell them apart: {} ({}; {laps}); add them as a second --measured.",
+        "To tell {what}: {} ({}; {laps}); add them as a second --measured.{never}",
         best.name,
         best.expectation()
     ))
 }
 
+/// Why there is no next experiment.
+fn no_experiment(trace: &Trace) -> String {
+    let answer = &trace.answer;
+    let Some(claimed) = answer.claimed() else {
+        return match answer.verdict {
+            Verdict::Faithful => "There is nothing to tell apart.".to_owned(),
+            _ => "Nothing is claimed, and no experiment was looked for.".to_owned(),
+        };
+    };
+    let others = rivals(answer).iter().skip(1).chain(answer.further());
+    let others = others.filter(|other| other.names() != claimed.names());
+    let others = distinct(others.map(Explanation::label));
+    if others.is_empty() {
+        return "There is nothing to tell apart.".to_owned();
+    }
+    let with_log = trace.from_logs.as_ref().map_or(
+        ", and laps as they are with the robot's log of readings and commands",
+        |_| ", each with the robot's log of readings and commands",
+    );
+    format!(
+        "None of the experiments that were looked at is expected to tell {} from {}: more laps as they are, laps the other way round, \
+         with another gain or threshold of the controller and at another speed{with_log}.",
+        claimed.label(),
+        others.join("; ")
+    )
+}
+
 /// The experiments that would tell rivals apart.
 pub(super) fn next_experiment(trace: &Trace) -> Vec<Block> {
     if trace.experiments.is_empty() {
-        return vec![Block::Text("There is nothing to tell apart.".into())];
+        return vec![Block::Text(no_experiment(trace))];
     }
     let mut blocks: Vec<Block> = next_in_words(trace).into_iter().map(Block::Text).collect();
     let mut table = Table::new(
@@ -95,17 +145,13 @@ pub(super) fn next_experiment(trace: &Trace) -> Vec<Block> {
         &["experiment", "rival", "sigma", "of laps", "laps for 5 sigma"],
     );
     for experiment in &trace.experiments {
-        let needed = |e: &Experiment| {
-            e.laps_needed()
-                .map_or("too many".to_owned(), |laps| laps.to_string())
-        };
         for (rival, sigma) in &experiment.separations {
             table.push([
                 experiment.name.clone(),
                 rival.clone(),
                 format!("{sigma:.1}"),
                 experiment.laps.to_string(),
-                needed(experiment),
+                (experiment.laps_for(*sigma)).map_or("too many".to_owned(), |laps| laps.to_string()),
             ]);
         }
     }
@@ -115,7 +161,15 @@ pub(super) fn next_experiment(trace: &Trace) -> Vec<Block> {
 
 /// The smallest effects that would have been seen.
 pub(super) fn limits(trace: &Trace) -> Vec<Block> {
-    let mut blocks: Vec<Block> = trace.remarks.iter().cloned().map(Block::Text).collect();
+    let mut blocks: Vec<Block> = trace.remarks_besides().cloned().map(Block::Text).collect();
+    if trace.from_logs.is_none() {
+        blocks.push(Block::Text(
+            "There is no log of readings and commands: the laps alone were judged.".into(),
+        ));
+    }
+    if trace.detectable.is_empty() {
+        return blocks;
+    }
     let mut sizes: BTreeMap<(&str, &str), Vec<&Detectable>> = BTreeMap::new();
     for detectable in &trace.detectable {
         let size = (detectable.spec.name, detectable.parameter);
@@ -130,6 +184,9 @@ pub(super) fn limits(trace: &Trace) -> Vec<Block> {
         &["effect", "parameter", "below", "above"],
     );
     let mut unseen = vec!["marker-offset (angle_rad)".to_owned()];
+    if trace.from_logs.is_none() {
+        unseen.push("gain and offset of S3 and S4, which neither controller reads".to_owned());
+    }
     for ((name, parameter), all) in sizes {
         let side = |of: &dyn Fn(&Detectable) -> Option<f64>, reversed: bool| range(&all, of, reversed);
         let (below, above) = (side(&|d| d.below, true), side(&|d| d.above, false));
@@ -193,19 +250,98 @@ pub(super) const CHANNELS: [&str; 10] = [
     "camera x", "camera y", "S0", "S1", "S2", "S3", "S4", "S5", "S6", "S7",
 ];
 
-/// What the robot's log says stage by stage.
+/// What the robot's logs say stage by stage, and whether the laps agree; nothing where there are no logs.
 pub(super) fn stages(trace: &Trace) -> Vec<Block> {
     let Some(found) = &trace.from_logs else {
-        return vec![Block::Text(
-            "There is no log of readings and commands: the laps alone were judged.".into(),
-        )];
+        return Vec::new();
     };
     let logs = &found.logs;
-    let decide = decide_in_words(&logs.decide, &trace.recordings);
-    let agree = if found.confirmed {
-        "The laps agree."
-    } else {
-        "The laps do not agree with what the logs say: both are shown and neither is claimed."
+    let mut table = Table::new("What the logs say, stage by stage", &["stage", "verdict"]);
+    for stage in [
+        Stage::Sense,
+        Stage::Decide,
+        Stage::Act,
+        Stage::World,
+        Stage::Observe,
+    ] {
+        table.push([stage.name().to_owned(), of_stage(trace, found, stage)]);
+    }
+    let mut blocks = vec![Block::Table(table)];
+    if !matches!(logs.decide, Decided::NoController { .. }) {
+        let agree = match (found.confirmed, trace.answer.verdict) {
+            (false, _) => {
+                " The laps do not agree with what the logs say: both are shown and neither is claimed."
+            }
+            (true, Verdict::Unexplained) => "",
+            (true, _) => " The laps agree.",
+        };
+        blocks.push(Block::Text(format!(
+            "{} control steps were followed by a filter over the pose that takes the camera and all readings; the probability of as \
+             much by chance is {}.{agree}",
+            logs.steps,
+            probability(logs.p)
+        )));
+    }
+    blocks
+}
+
+/// What the logs say of a stage.
+fn of_stage(trace: &Trace, found: &FromLogs, stage: Stage) -> String {
+    match (&found.logs.decide, stage) {
+        (Decided::AsDeclared, Stage::Decide) => {
+            "as declared: every logged command follows from the logged readings".to_owned()
+        }
+        (Decided::Unknown, Stage::Decide) => "no control step has both readings and commands".to_owned(),
+        (Decided::NoController { share, .. }, Stage::Decide) => format!(
+            "no controller of this kind: {:.1} % of the commands do not follow from the readings",
+            100.0 * share
+        ),
+        (Decided::NoController { .. }, _) => "not judged".to_owned(),
+        // What the laps do not confirm is what the logs say all the same.
+        _ if !found.confirmed => of_answer(trace, &found.logs.answer, stage),
+        _ => of_answer(trace, &trace.answer, stage),
+    }
+}
+
+/// What an answer has in a stage.
+fn of_answer(trace: &Trace, answer: &Answer, stage: Stage) -> String {
+    let Some(claimed) = answer.claimed() else {
+        return match &answer.cause {
+            Some(cause) if cause.stage == stage => format!("{}, without a name", cause_in_words(cause)),
+            _ if answer.verdict == Verdict::Faithful => "as declared".to_owned(),
+            _ => "nothing is claimed".to_owned(),
+        };
+    };
+    let own = |explanation: &Explanation| -> Vec<Candidate> {
+        let effects = explanation.effects.iter();
+        effects
+            .filter(|effect| effect.stage() == stage)
+            .cloned()
+            .collect()
+    };
+    let label = |rival: &Explanation| {
+        own(rival)
+            .iter()
+            .map(Candidate::label)
+            .collect::<Vec<_>>()
+            .join(" and ")
+    };
+    let mut others = distinct(rivals(answer).iter().map(label));
+    others.retain(|other| !other.is_empty() && *other != label(claimed));
+    let others = others.join(" or ");
+    match (described(trace, &own(claimed)).join(" and "), answer.verdict) {
+        (own, _) if !own.is_empty() && others.is_empty() => own,
+        (own, _) if !own.is_empty() => format!("{own}; not told apart from {others}"),
+        _ if !others.is_empty() => format!("as declared, unless it is {others}"),
+        (_, Verdict::PartlyExplained) => "nothing found, but something is left".to_owned(),
+        _ => "as declared".to_owned(),
+    }
+}
+
+/// What is left of the logs' innovations; nothing where there are no logs.
+pub(super) fn innovations(trace: &Trace) -> Vec<Block> {
+    let Some(FromLogs { logs, .. }) = &trace.from_logs else {
+        return Vec::new();
     };
     let mut table = Table::new(
         "Innovations of the filter with the best explanation: 1, 3 and 0 if it were the whole truth",
@@ -220,14 +356,5 @@ pub(super) fn stages(trace: &Trace) -> Vec<Block> {
             format!("{:+.3}", channel.correlation),
         ]);
     }
-    vec![
-        Block::Text(decide),
-        Block::Text(format!(
-            "{} control steps were followed by a filter over the pose that takes the camera and all readings; the probability of as \
-             much by chance is {}. {agree}",
-            logs.steps,
-            probability(logs.p)
-        )),
-        Block::Table(table),
-    ]
+    vec![Block::Table(table)]
 }

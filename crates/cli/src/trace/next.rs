@@ -71,13 +71,13 @@ impl Experiment {
         }
     }
 
-    /// Laps that tell the answer from the rivals that it tells; `None` if that would take too many.
+    /// Laps that tell the answer from the rivals that it tells; `None` if it tells none, with as many as anyone records.
     pub(crate) fn laps_needed(&self) -> Option<usize> {
         self.laps_for(self.least())
     }
 
-    /// Laps that tell what lies apart so far.
-    fn laps_for(&self, sigmas: f64) -> Option<usize> {
+    /// Laps that tell what lies so many standard deviations apart in it.
+    pub(crate) fn laps_for(&self, sigmas: f64) -> Option<usize> {
         let needed = (self.laps as f64 * (ENOUGH / sigmas).powi(2)).ceil();
         (needed <= MOST_LAPS as f64).then_some((needed as usize).max(RUNS))
     }

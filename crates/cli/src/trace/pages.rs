@@ -1,25 +1,28 @@
 //! A trace as a colleague would write it: sections of a report.
 
-use anyhow::Result;
-use diagnose::{Candidate, Cause, Decided, Departures, Explanation, Quadratic, Verdict};
-use sim::Pattern;
+mod candidates;
+mod departures;
+mod in_words;
 
-use super::answer::rivals;
-use super::document::distinct;
+use anyhow::Result;
+
+use candidates::candidates;
+use departures::residual;
+pub(crate) use in_words::{cause_in_words, described, summary};
+
 use super::errors::{Eq8, LapTimes};
-use super::limits::{decide_in_words, limits, next_experiment, next_in_words, stages};
-use super::unnamed::{in_words, unnamed};
+use super::limits::{innovations, limits, next_experiment, stages};
 use super::{Trace, pictures};
 use crate::experiments::{Block, Picture, Section};
 use crate::figures::MM;
-use crate::table::{Table, four_digits, probability, with_error, with_interval};
+use crate::table::Table;
 
-/// The sections of a trace.
+/// The sections of a trace, with figures numbered as they come.
 ///
 /// # Errors
 /// Laps that cannot be compared.
 pub(crate) fn sections(trace: &Trace) -> Result<Vec<Section>> {
-    Ok(vec![
+    let sections = vec![
         Section {
             heading: "Diagnosis".into(),
             blocks: diagnosis(trace),
@@ -33,11 +36,14 @@ pub(crate) fn sections(trace: &Trace) -> Result<Vec<Section>> {
             blocks: candidates(trace),
         },
         Section {
-            heading: "Stage by stage".into(),
-            blocks: stages(trace),
+            heading: "What the logs leave".into(),
+            blocks: innovations(trace),
         },
         Section {
-            heading: "Before and after".into(),
+            heading: match trace.answer.claimed() {
+                Some(_) => "Before and after".into(),
+                None => "Measured and simulated".into(),
+            },
             blocks: before_and_after(trace),
         },
         Section {
@@ -48,7 +54,48 @@ pub(crate) fn sections(trace: &Trace) -> Result<Vec<Section>> {
             heading: "What cannot be seen".into(),
             blocks: limits(trace),
         },
-    ])
+    ];
+    let with_content = |section: &Section| !section.blocks.is_empty();
+    let mut sections: Vec<Section> = sections.into_iter().filter(with_content).collect();
+    let blocks = sections.iter_mut().flat_map(|section| &mut section.blocks);
+    let pictures = blocks.filter_map(|block| match block {
+        Block::Picture(picture) => Some(picture),
+        _ => None,
+    });
+    for (letter, picture) in ('A'..='Z').zip(pictures) {
+        picture.number = format!("Fig. {letter}");
+    }
+    Ok(sections)
+}
+
+impl Trace {
+    /// All that a report of these sections says, each sentence once and without the pictures; what must be known of the data follows
+    /// the diagnosis.
+    pub(crate) fn text(&self, sections: &[Section]) -> String {
+        let mut text = String::new();
+        for (place, section) in sections.iter().enumerate() {
+            for block in &section.blocks {
+                match block {
+                    Block::Text(said) if !text.contains(said) => text += &format!("{said}\n"),
+                    Block::Table(table) => text += &format!("\n{}", table.to_text()),
+                    _ => {}
+                }
+            }
+            if place == 0 {
+                text.extend(
+                    self.remarks_besides()
+                        .map(|remark| format!("of the data: {remark}\n")),
+                );
+            }
+        }
+        text
+    }
+
+    /// What must be known of the data, but for what the summary says.
+    pub(super) fn remarks_besides(&self) -> impl Iterator<Item = &String> {
+        let said = summary(self);
+        self.remarks.iter().filter(move |remark| !said.contains(*remark))
+    }
 }
 
 /// A trace as a part of another report.
@@ -56,192 +103,28 @@ pub(crate) fn digest(trace: &Trace) -> Vec<Block> {
     [diagnosis(trace), residual(trace), candidates(trace)].concat()
 }
 
-/// The answer in sentences.
-pub(crate) fn summary(trace: &Trace) -> String {
-    let diagnosis = &trace.answer;
-    let answer = diagnosis.explanations.first();
-    let said = match (diagnosis.verdict, answer) {
-        (Verdict::Faithful, _) => {
-            format!(
-                "Faithful: the {} do not depart from the declared model by more than chance allows.",
-                trace.source()
-            )
-        }
-        (Verdict::Unexplained, _) | (_, None) => unexplained(trace),
-        (v, Some(answer)) => {
-            let what = described(trace, &answer.effects);
-            let rest = if v == Verdict::Explained && answer.remainder_p.is_some() && !answer.fits() {
-                " What remains is significant but small."
-            } else if v == Verdict::PartlyExplained {
-                " What remains is significant and matters."
-            } else {
-                " Nothing significant remains."
-            };
-            let mut word = v.name().to_owned();
-            word[..1].make_ascii_uppercase();
-            let explains = match answer.explained(trace.laps_alone()) {
-                Some(share) => format!("this explains {:.1} % of the excess", 100.0 * share),
-                None => format!(
-                    "this gains {:.1} units of log-likelihood, of an excess that as a whole chance often makes",
-                    answer.gain
-                ),
-            };
-            format!("{word}: {}; {explains}.{rest}", what.join(" and "))
-        }
-    };
-    // Two sizes of one effect are no two answers.
-    let answers = distinct(rivals(diagnosis).iter().map(Explanation::label));
-    let others = answers.get(1..).unwrap_or_default();
-    let alternatives = if others.is_empty() {
-        String::new()
-    } else {
-        format!(
-            " These {} do not tell it apart from: {}.",
-            trace.source(),
-            others.join("; ")
-        )
-    };
-    let further = further_in_words(trace);
-    let next = next_in_words(trace).map_or(String::new(), |next| format!("\n{next}"));
-    format!(
-        "{said}{alternatives}{further}{next}\nError of the mean lap on {}: {:.2} mm before, {:.2} mm after; {:.2} mm would be chance.",
-        trace.judged_runs(),
-        MM * trace.mean_m(|e| &e.before_m),
-        MM * trace.mean_m(|e| &e.after_m),
-        MM * trace.mean_m(|e| &e.floor_m)
-    )
-}
-
-/// What may be there beside what is claimed.
-fn further_in_words(trace: &Trace) -> String {
-    let Some(claimed) = trace.answer.claimed() else {
-        return String::new();
-    };
-    let further = trace.answer.further().into_iter().map(|further| {
-        let more = further.gain - claimed.gain;
-        format!(
-            "{} (gains {more:.1} units of log-likelihood more)",
-            further.label()
-        )
-    });
-    let further: Vec<String> = further.collect();
-    if further.is_empty() {
-        return String::new();
-    }
-    format!(
-        " Another effect may be there, for which these {} speak, but not enough to claim it: {}.",
-        trace.source(),
-        further.join("; ")
-    )
-}
-
-/// Why nothing is claimed.
-fn unexplained(trace: &Trace) -> String {
-    if let Some(found) = trace.from_logs.as_ref().filter(|found| !found.confirmed) {
-        let said: Vec<String> = (found.logs.answer.explanations.first().iter())
-            .map(|answer| answer.label())
-            .collect();
-        return format!(
-            "Unexplained: the log says {}, and the laps do not agree. Neither is claimed.",
-            if said.is_empty() {
-                "that nothing is missing".to_owned()
-            } else {
-                said.join(", ")
-            }
-        );
-    }
-    if let Some(found) = &trace.from_logs
-        && matches!(found.logs.decide, Decided::NoController { .. })
-    {
-        return format!(
-            "Unexplained: {}",
-            decide_in_words(&found.logs.decide, &trace.recordings)
-        );
-    }
-    let known = trace.answer.cause.as_ref().map(|cause| {
-        let stage = cause.stage.name();
-        match cause.depends_on.as_str() {
-            "chance" => format!(" It sits in the {stage} stage: noise of the {}.", cause.acts_on),
-            on => format!(" It sits in the {stage} stage: {} by {on}.", cause.acts_on),
-        }
-    });
-    format!(
-        "Unexplained: the data depart from the declared model, and no effect in the registry explains it. No name would be honest.{}",
-        known.unwrap_or_default()
-    )
-}
-
-/// Effects with their sizes, one by one, for a sentence.
-fn described(trace: &Trace, effects: &[Candidate]) -> Vec<String> {
-    effects.iter().map(|effect| describe(trace, effect)).collect()
-}
-
-/// An effect with its size, for a sentence.
-fn describe(trace: &Trace, effect: &Candidate) -> String {
-    let name = effect.setting.spec.name;
-    match (&effect.setting.pattern, Cause::of(&effect.setting)) {
-        (_, Some(cause)) => in_words(trace, effect, &cause),
-        (Pattern::Constant(_), _) => format!("{name} ({})", size(effect)),
-        (Pattern::ByTime { .. }, _) => format!("{name} changing in time ({})", size(effect)),
-        (Pattern::ByRun(_), _) => format!("{name} by run ({})", size(effect)),
-    }
-}
-
-/// The size of an effect, with its standard error where it was fitted, or with its interval where that says more.
-fn size(effect: &Candidate) -> String {
-    let params = effect.setting.spec.params;
-    let numbers = effect.setting.pattern.numbers();
-    let number = |place: usize, param: &sim::Param| {
-        let (value, error) = (numbers[place], effect.standard_errors[place]);
-        match effect.intervals.get(&place) {
-            // An end of the parameter's range is none of the interval's.
-            Some(&[low, high]) => with_interval(
-                value,
-                [
-                    (low > param.low).then_some(low),
-                    (high < param.high).then_some(high),
-                ],
-            ),
-            None if effect.interval(place) == [param.low, param.high] => with_interval(value, [None; 2]),
-            None if error > 0.0 => with_error(value, error),
-            None => four_digits(value),
-        }
-    };
-    let list = |first: usize| {
-        let one = |(i, p): (usize, &sim::Param)| match p.choices.get(numbers[first + i] as usize) {
-            Some(choice) => format!("{} {choice}", p.name),
-            None => format!("{} {}", p.name, number(first + i, p)),
-        };
-        params.iter().enumerate().map(one).collect::<Vec<_>>().join(", ")
-    };
-    match &effect.setting.pattern {
-        Pattern::Constant(_) => list(0),
-        Pattern::ByTime { per_s, .. } => {
-            let changing = (params.iter().enumerate()).filter(|(i, _)| per_s[*i] != 0.0);
-            let changes = changing
-                .map(|(i, p)| format!("; {} changes by {} per s", p.name, number(params.len() + i, p)));
-            format!("{} at the start{}", list(0), changes.collect::<String>())
-        }
-        Pattern::ByRun(runs) => {
-            let each: Vec<String> = (0..runs.len()).map(|run| list(run * params.len())).collect();
-            each.join("; ")
-        }
-    }
-}
-
+/// The answer, the verdict by stage where there are logs, and the error.
 fn diagnosis(trace: &Trace) -> Vec<Block> {
     let mut blocks: Vec<Block> = summary(trace)
         .lines()
         .map(|l| Block::Text(l.to_owned()))
         .collect();
+    blocks.splice(1..1, stages(trace));
     blocks.push(Block::Table(error_table(trace)));
     blocks
 }
 
 fn error_table(trace: &Trace) -> Table {
+    // Where nothing is added after is before.
+    let of_answer = |[what, before, after, chance]: [String; 4]| match trace.answer.claimed() {
+        Some(_) => vec![what, before, after, chance],
+        None => vec![what, before, chance],
+    };
+    let before = trace.answer.claimed().map_or("declared model", |_| "before");
+    let columns = of_answer(["", before, "after", "chance"].map(String::from));
     let mut table = Table::new(
         format!("The simulation against {}", trace.judged_runs()),
-        &["", "before", "after", "chance"],
+        &columns.iter().map(String::as_str).collect::<Vec<_>>(),
     );
     let mm = |m: f64| format!("{:.2}", MM * m);
     for errors in &trace.errors {
@@ -250,12 +133,21 @@ fn error_table(trace: &Trace) -> Table {
             _ => format!("{}: ", trace.recordings[errors.recording].measured.set.name),
         };
         let mean_mm = |values: &[f64]| mm(values.iter().sum::<f64>() / values.len() as f64);
-        table.push([
+        table.push(of_answer([
             format!("{of}mean lap, rms over the gates, mm"),
             mean_mm(&errors.before_m),
             mean_mm(&errors.after_m),
             mean_mm(&errors.floor_m),
-        ]);
+        ]));
+        if let Some(own_m) = &errors.own_m {
+            let after = mean_mm(own_m);
+            table.push(of_answer([
+                format!("{of}the same with each run's own size, fitted, mm"),
+                "-".into(),
+                after,
+                "-".into(),
+            ]));
+        }
         let LapTimes {
             measured_s,
             before_s,
@@ -263,15 +155,20 @@ fn error_table(trace: &Trace) -> Table {
             chance_s,
         } = errors.lap_times;
         let [before, after] = [before_s, after_s].map(|s| format!("{:+.2}", s - measured_s));
-        table.push([
+        table.push(of_answer([
             format!("{of}lap time, s off"),
             before,
             after,
             format!("{chance_s:.2}"),
-        ]);
+        ]));
         if let Some(starts) = &errors.starts {
             let [before, after, chance] = starts.errors_mm().map(|mm| format!("{mm:.2}"));
-            table.push([format!("{of}start of runs, rms, mm"), before, after, chance]);
+            table.push(of_answer([
+                format!("{of}start of runs, rms, mm"),
+                before,
+                after,
+                chance,
+            ]));
         }
         for of_modes in errors.eq_8 {
             let Eq8 {
@@ -282,126 +179,15 @@ fn error_table(trace: &Trace) -> Table {
             } = of_modes;
             let [before, after, chance] =
                 [before, after, chance].map(|d| d.map_or("-".into(), |d| format!("{d:.2}")));
-            table.push([format!("{of}eq. 8 in {modes} modes"), before, after, chance]);
+            table.push(of_answer([
+                format!("{of}eq. 8 in {modes} modes"),
+                before,
+                after,
+                chance,
+            ]));
         }
     }
     table
-}
-
-fn residual(trace: &Trace) -> Vec<Block> {
-    let answer = trace.answer.explanations.first();
-    let mut table = Table::new(
-        "What the laps hold beyond the expectation of the declared model, and of the model with the answer (excess: squared deviations in \
-         units of chance, less as many as chance makes)",
-        &["part", "freedom", "excess", "p", "with the answer", "p with it"],
-    );
-    let words = [
-        "mean lap",
-        "run to run",
-        "drift within runs",
-        "noise",
-        "start of runs",
-    ];
-    let named = |numbers: &Departures| {
-        words
-            .into_iter()
-            .zip(numbers.named().into_iter().map(|of| of.1))
-            .collect::<Vec<_>>()
-    };
-    // What rounds to nothing has no sign.
-    let shown = |q: Quadratic| [format!("{:.0}", q.excess().round() + 0.0), probability(q.p)];
-    let remainder = answer.and_then(|answer| answer.remainder.as_ref()).map(named);
-    for (i, (name, declared)) in named(&trace.residual).into_iter().enumerate() {
-        let left = (remainder.as_ref()).map_or(["-".into(), "-".into()], |left| shown(left[i].1));
-        let row = [name.to_owned(), declared.freedom.to_string()];
-        if declared.freedom == 0 {
-            table.push(row.into_iter().chain(["-"; 4].map(String::from)));
-            continue;
-        }
-        table.push(row.into_iter().chain(shown(declared)).chain(left));
-    }
-    let of = of_shown(trace);
-    vec![
-        Block::Table(table),
-        Picture::block(
-            "residual_map",
-            "Fig. A",
-            format!(
-                "Where the residual sits: the mean measured lap, coloured by its distance from the declared model's.{of}"
-            ),
-            pictures::residual_map(trace),
-        ),
-    ]
-}
-
-fn candidates(trace: &Trace) -> Vec<Block> {
-    if trace.answer.explanations.is_empty() {
-        return vec![Block::Text("Nothing had to be tried.".into())];
-    }
-    let source = trace.source();
-    let further = trace.answer.further();
-    let and_further = if further.is_empty() {
-        ""
-    } else {
-        "; what those marked + have besides may be there"
-    };
-    let rivals = trace.answer.indistinguishable;
-    let and_rivals = if rivals > 1 {
-        format!("; those marked * cannot be told apart by these {source}")
-    } else {
-        String::new()
-    };
-    let mut table = Table::new(
-        format!(
-            "Explanations fitted to the {source}, best first by what they gain less the price of their numbers, with sizes ± one standard \
-             error{and_rivals}{and_further}"
-        ),
-        &[
-            "effect",
-            "log-likelihood gained",
-            "less price",
-            "explained",
-            "remainder p",
-            "size",
-        ],
-    );
-    for (place, e) in trace.answer.explanations.iter().enumerate() {
-        let mark = if rivals > 1 && place < rivals {
-            " *"
-        } else if further.contains(&e) {
-            " +"
-        } else {
-            ""
-        };
-        table.push([
-            format!("{}{mark}", e.label()),
-            units(e.gain),
-            units(e.score),
-            e.explained(trace.laps_alone())
-                .map_or("-".into(), |share| format!("{:.1} %", 100.0 * share)),
-            e.remainder_p.map_or("-".into(), probability),
-            sizes(trace, e),
-        ]);
-    }
-    let mut blocks = vec![Block::Table(table)];
-    blocks.extend(unnamed(trace));
-    blocks
-}
-
-/// Log-likelihood; what a log shows exactly is no matter of likelihood.
-fn units(gain: f64) -> String {
-    if gain.is_finite() {
-        format!("{gain:.1}")
-    } else {
-        "certain".into()
-    }
-}
-
-fn sizes(trace: &Trace, explanation: &Explanation) -> String {
-    match explanation.effects.as_slice() {
-        [effect] if Cause::of(&effect.setting).is_none() => size(effect),
-        effects => described(trace, effects).join(" + "),
-    }
 }
 
 /// Whose laps are drawn, a sentence for a caption, where there are several data sets.
@@ -417,34 +203,45 @@ fn of_shown(trace: &Trace) -> String {
 
 fn before_and_after(trace: &Trace) -> Vec<Block> {
     let of = of_shown(trace);
+    let [with_answer, left, right] = match trace.answer.claimed() {
+        Some(_) => [
+            ", and with the answer",
+            "each of the two leaves of the measured mean lap",
+            " Where the answer is right, 95 of 100 bars reach its line.",
+        ],
+        None => [
+            "",
+            "it leaves of the measured mean lap",
+            " Where the model is right, 95 of 100 bars reach its line.",
+        ],
+    };
     let mut blocks = vec![
         Picture::block(
             "mean_laps",
-            "Fig. B",
+            "",
             format!(
-                "Mean position at each gate: measured, simulated with the declared model, and with the answer. Below, what each of \
-                 the two leaves of the measured mean lap; in the band, 95 of 100 gates lie by chance. The mean over all runs is nearer \
-                 to both than single runs, whose errors the table has.{of}"
+                "Mean position at each gate: measured, simulated with the declared model{with_answer}. Below, what {left}; in the \
+                 band, 95 of 100 gates lie by chance. The mean over all runs is nearer to the simulation than single runs, whose \
+                 errors the table has.{of}"
             ),
             pictures::mean_laps(trace),
         ),
         Picture::block(
             "laps",
-            "Fig. C",
-            format!("Laps of the declared model and with the answer, over measured ones.{of}"),
+            "",
+            format!("Laps of the declared model{with_answer}, over measured ones.{of}"),
             pictures::laps(trace),
         ),
     ];
-    if let Some(starts) = &trace.shown().1.starts {
+    if let Some(starts) = pictures::starts(trace) {
         blocks.push(Picture::block(
             "starts",
-            "Fig. D",
+            "",
             format!(
                 "How runs start: how far the robot is ahead of where it would be had it always been as fast as in the second after, on \
-                 average over the runs. One that sets off late is ahead at first, for it then falls behind. Where the answer is right, 95 of \
-                 100 bars reach its line.{of}"
+                 average over the runs. One that sets off late is ahead at first, for it then falls behind.{right}{of}"
             ),
-            pictures::starts(starts),
+            starts,
         ));
     }
     blocks

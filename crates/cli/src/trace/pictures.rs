@@ -5,7 +5,6 @@ use diagnose::{MeanBeginning, MeanLaps, mean_lap};
 use track::Lap;
 
 use super::Trace;
-use super::errors::Starts;
 use super::recording::Recording;
 use crate::figures::{MM, across, colored_path, crossings, line, map, single, walls};
 use crate::laps::SampledRun;
@@ -21,21 +20,46 @@ fn mean_measured(recording: &Recording) -> Vec<f64> {
     mean_lap(&laps).unwrap_or_default()
 }
 
-/// Where on the circuit the residual sits.
+/// What is simulated, with the declared model and, where anything is claimed, with the answer: label, what is drawn, and its line.
+fn simulated<T>(trace: &Trace, before: T, after: T) -> Vec<(&'static str, T, Style)> {
+    let declared = (
+        "declared model",
+        before,
+        line(Color::VERMILLION, Dash::Dashed, 1.6),
+    );
+    let answer = || ("with the answer", after, line(Color::BLUE, Dash::Solid, 1.6));
+    let claimed = trace.answer.claimed().map(|_| answer());
+    std::iter::once(declared).chain(claimed).collect()
+}
+
+/// How far the mean measured lap is from the declared model's, gate by gate, mm (left: positive).
+pub(super) fn residual_mm(trace: &Trace) -> Vec<f64> {
+    let (recording, errors) = trace.shown();
+    let pairs = mean_measured(recording).into_iter().zip(errors.before.mean_m());
+    pairs
+        .map(|(measured, simulated)| MM * (measured - simulated))
+        .collect()
+}
+
+/// Within which distance of a simulation as many laps of the same model are by chance at 95 of 100 gates, gate by gate, mm.
+pub(super) fn chance_mm(trace: &Trace, simulated: &MeanLaps) -> Vec<f64> {
+    let errors_m = simulated.standard_error_m(&trace.shown().0.shape());
+    errors_m.into_iter().map(|error_m| 1.96 * MM * error_m).collect()
+}
+
+/// Where on the circuit the residual sits; what is within chance, with the answer if there is one, is pale.
 pub(super) fn residual_map(trace: &Trace) -> Figure {
+    /// Reach of the colours as a multiple of what is within chance.
+    const REACH: f64 = 4.0;
     let (recording, errors) = trace.shown();
     let circuit = recording.setup.scene.circuit();
-    let measured = mean_measured(recording);
-    let mut points = crossings(circuit, &measured);
-    let mut values: Vec<f64> = measured
-        .iter()
-        .zip(errors.before.mean_m())
-        .map(|(m, s)| MM * (m - s))
-        .collect();
+    let mut points = crossings(circuit, &mean_measured(recording));
+    let mut values = residual_mm(trace);
+    let least = REACH * chance_mm(trace, &errors.after).into_iter().fold(0.0, f64::max);
     points.push(points[0]);
     values.push(values[0]);
     let label = "measured less simulated, mm (left: positive)";
-    let panel = colored_path(circuit, points, values, label, 0.1);
+    let panel = colored_path(circuit, points, values, label, least);
     single(
         "Residual map",
         "The mean measured lap, coloured by its distance from the declared model's mean lap.",
@@ -47,50 +71,46 @@ pub(super) fn residual_map(trace: &Trace) -> Figure {
 pub(super) fn mean_laps(trace: &Trace) -> Figure {
     let (recording, errors) = trace.shown();
     let measured = mean_measured(recording);
-    let declared = line(Color::VERMILLION, Dash::Dashed, 1.6);
-    let answer = line(Color::BLUE, Dash::Solid, 1.6);
-    let left = |laps: &MeanLaps| -> Vec<f64> {
+    let simulated = simulated(trace, &errors.before, &errors.after);
+    let left = |&(label, laps, style): &(&str, &MeanLaps, Style)| {
         let pairs = measured.iter().zip(laps.mean_m());
-        pairs.map(|(measured, simulated)| measured - simulated).collect()
+        let left: Vec<f64> = pairs.map(|(measured, simulated)| measured - simulated).collect();
+        (label.to_owned(), left, style)
     };
-    let mut below = across(&[
-        ("declared model".into(), left(&errors.before), declared),
-        ("with the answer".into(), left(&errors.after), answer),
-    ]);
+    let mut below = across(&simulated.iter().map(left).collect::<Vec<_>>());
     below.y = Axis::linear("measured less simulated, mm");
-    let band = |(gate, error_m): (usize, f64)| Interval {
+    let band = |(gate, chance_mm): (usize, f64)| Interval {
         at: gate as f64,
-        low: -1.96 * MM * error_m,
-        high: 1.96 * MM * error_m,
+        low: -chance_mm,
+        high: chance_mm,
     };
-    let shape = recording.shape();
-    let errors_m = errors.after.standard_error_m(&shape);
-    let chance = errors_m.into_iter().enumerate().map(band).collect();
+    let chance = chance_mm(trace, &errors.after)
+        .into_iter()
+        .enumerate()
+        .map(band)
+        .collect();
     let style = Style::color(Color::INK);
     below
         .marks
         .insert(0, Mark::new("95 % by chance", style, Shape::Band(chance)));
-    let above = across(&[
-        (
-            "measured".into(),
-            measured.clone(),
-            line(Color::INK, Dash::Solid, 2.0),
-        ),
-        ("declared model".into(), errors.before.mean_m().to_vec(), declared),
-        ("with the answer".into(), errors.after.mean_m().to_vec(), answer),
-    ]);
+    let means = (simulated.iter()).map(|(label, laps, style)| (*label, laps.mean_m().to_vec(), *style));
+    let of_robot = ("measured", measured.clone(), line(Color::INK, Dash::Solid, 2.0));
+    let curves = std::iter::once(of_robot).chain(means);
+    let curves: Vec<_> = curves
+        .map(|(label, mean_m, style)| (label.to_owned(), mean_m, style))
+        .collect();
+    let above = across(&curves);
     Figure {
         title: "Mean laps".into(),
-        description:
-            "Mean position at each gate: measured, declared model, with the answer; and what the two leave."
-                .into(),
+        description: "Mean position at each gate, measured and simulated; and what simulations leave.".into(),
         panels: vec![above, below],
         ..Figure::default()
     }
 }
 
-/// How runs start.
-pub(super) fn starts(starts: &Starts) -> Figure {
+/// How runs start, if that is known.
+pub(super) fn starts(trace: &Trace) -> Option<Figure> {
+    let starts = trace.shown().1.starts.as_ref()?;
     let points = |of: &MeanBeginning| of.ahead_mm().map(|(time_s, mm)| [time_s, mm]).collect::<Vec<_>>();
     let [.., chance_mm] = starts.errors_mm();
     let measured = points(&starts.measured);
@@ -103,24 +123,21 @@ pub(super) fn starts(starts: &Starts) -> Figure {
         intervals: measured.iter().map(bar).collect(),
         direction: Direction::Vertical,
     };
-    let simulated = |label: &str, of: &MeanBeginning, color, dash| {
-        Mark::new(label, line(color, dash, 1.6), Shape::Line(points(of)))
-    };
+    let simulated = simulated(trace, &starts.before, &starts.after).into_iter();
+    let mut marks: Vec<Mark> = simulated
+        .map(|(label, of, style)| Mark::new(label, style, Shape::Line(points(of))))
+        .collect();
     let style = Style::color(Color::INK);
+    marks.push(Mark::new("measured", style, bars));
+    marks.push(Mark::new("measured", style, Shape::Points(measured)));
     let panel = Panel {
         x: Axis::linear("time since the run began, s"),
         y: Axis::linear("ahead of steady motion, mm"),
-        marks: vec![
-            simulated("declared model", &starts.before, Color::VERMILLION, Dash::Dashed),
-            simulated("with the answer", &starts.after, Color::BLUE, Dash::Solid),
-            Mark::new("measured", style, bars),
-            Mark::new("measured", style, Shape::Points(measured)),
-        ],
+        marks,
         ..Panel::default()
     };
-    let description =
-        "How far the robot is ahead of steady motion: measured, declared model, with the answer.";
-    single("How runs start", description, panel)
+    let description = "How far the robot is ahead of steady motion, measured and simulated.";
+    Some(single("How runs start", description, panel))
 }
 
 /// Laps before and after over measured ones.
@@ -157,19 +174,8 @@ pub(super) fn laps(trace: &Trace) -> Figure {
         style(Color::INK),
         Shape::Line(measured_laps),
     ));
-    marks.push(Mark::new(
-        "declared model",
-        style(Color::VERMILLION),
-        Shape::Line(few(&errors.before)),
-    ));
-    marks.push(Mark::new(
-        "with the answer",
-        style(Color::BLUE),
-        Shape::Line(few(&errors.after)),
-    ));
-    single(
-        "Laps before and after",
-        "Laps of the declared model and with the answer over the measured ones.",
-        map("", marks),
-    )
+    for (label, laps, line) in simulated(trace, &errors.before, &errors.after) {
+        marks.push(Mark::new(label, style(line.color), Shape::Line(few(laps))));
+    }
+    single("Laps", "Simulated laps over measured ones.", map("", marks))
 }

@@ -16,7 +16,7 @@ pub(super) fn sizes_by_run_in_words(answer: &Answer) -> Option<String> {
     (!names.is_empty()).then(|| {
         format!(
             "The size of {} differs from run to run: that of a run which is held out is not known, and the mean of the others stands \
-             for it. The error after is that of such a run; model.after.toml has each run's own size.",
+             for it. The error after is that of such a run and may be larger than before; model.after.toml has each run's own size.",
             names.join(" and ")
         )
     })
