@@ -41,6 +41,7 @@ mod glyph;
 mod layout;
 mod legend;
 mod mark;
+mod numbers;
 mod path;
 mod plan;
 mod style;

@@ -35,11 +35,16 @@ pub(crate) fn run(session: &Session, args: &args::Trace) -> Result<()> {
     folder.write("model.after.toml", trace.after_config().to_toml())?;
     for picture in sections.iter().flat_map(Section::pictures) {
         folder.write(&format!("figures/{}.svg", picture.file), picture.figure.to_svg()?)?;
+        folder.write(&format!("figures/{}.csv", picture.file), picture.figure.to_csv())?;
     }
     folder.write("gates.csv", gates_csv(&trace))?;
     folder.write("starts.csv", starts_csv(&trace))?;
-    for (number, table) in sections.iter().flat_map(Section::tables).enumerate() {
-        folder.write(&format!("tables/{:02}.csv", number + 1), table.to_csv())?;
+    let tables = sections
+        .iter()
+        .flat_map(|section| section.tables().map(move |table| (section, table)));
+    for (number, (section, table)) in tables.enumerate() {
+        let heading = section.heading.to_lowercase().replace(' ', "_");
+        folder.write(&format!("tables/{:02}_{heading}.csv", number + 1), table.to_csv())?;
     }
     let text = trace.text(&sections);
     let names: Vec<&str> = (trace.recordings.iter())
