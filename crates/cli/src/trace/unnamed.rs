@@ -53,7 +53,7 @@ pub(super) fn in_words(trace: &Trace, effect: &Candidate, cause: &Cause) -> Stri
     let middle = area.middle_m + trace.shown().0.setup.scene.circuit().middle();
     let errors = &effect.standard_errors[effect.setting.spec.params.len()..];
     format!(
-        "an effect without a name on the {acts_on} in an area of the floor ({} {}, at x = {} m, y = {} m, radius {} m)",
+        "an effect without a name on the {acts_on} in an area of the floor ({} {}, at x = {} m, y = {} m, radius {} m, if it is round and fades outwards)",
         with_error(area.amount, errors[0]),
         unit(cause),
         with_error(middle.x, errors[1]),

@@ -126,8 +126,7 @@ pub(crate) fn p_among(number: f64, others: &[f64]) -> Option<f64> {
 /// likelihood, which is `base` as declared, tells them among simulated logs ([`p_among_repeats`]); and the memory of slip that does as
 /// the level.
 pub(crate) fn detectable_noises(evidence: &Evidence<'_>, base: f64, alarm: f64) -> Vec<Detectable> {
-    let among = StudentsT::new(0.0, 1.0, REPEATS as f64 - 1.0);
-    let needed = among.map_or(f64::NAN, |law| -law.inverse_cdf(0.5 * alarm / FACTORS)) + QUANTILE_95;
+    let needed = among_repeats(0.5 * alarm / FACTORS);
     let sized = |name: &&str| {
         let factor = Factor::neutral(find(name).ok()?);
         let log = needed * factor.error(evidence, &[], base)?;
@@ -139,6 +138,15 @@ pub(crate) fn detectable_noises(evidence: &Evidence<'_>, base: f64, alarm: f64) 
         all.push(seen(memory, [f64::NEG_INFINITY, memory_of(more)]));
     }
     all
+}
+
+/// Standard deviations by which a number must differ from those of as many as [`REPEATS`] simulated logs for a Student's t of such a
+/// one-sided probability in 95 of 100 cases: the noncentral t is about normal, with a variance of 1 + t^2 / 2f (Johnson and Welch 1940).
+fn among_repeats(p: f64) -> f64 {
+    let logs = REPEATS as f64;
+    let t = StudentsT::new(0.0, 1.0, logs - 1.0).map_or(f64::NAN, |law| -law.inverse_cdf(p));
+    let deviation = (1.0 + t * t / (2.0 * (logs - 1.0))).sqrt();
+    (t + QUANTILE_95 * deviation) * (1.0 + 1.0 / logs).sqrt()
 }
 
 /// An effect that is seen beyond these sizes, as far as its range goes.
@@ -322,6 +330,19 @@ pub(crate) fn factor_again(evidence: &Evidence<'_>, settings: &[Setting]) -> Opt
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn numbers_that_far_off_raise_the_alarm_in_95_of_100_cases() {
+        const P: f64 = 0.005;
+        let far = among_repeats(P);
+        let mut stream = sim::Streams { seed: 11, run: 0 }.open("logs");
+        let mut rings = || {
+            let logs: Vec<f64> = (0..REPEATS).map(|_| stream.normal()).collect();
+            p_among(far + stream.normal(), &logs).is_some_and(|p| p < 2.0 * P)
+        };
+        let rung = (0..2000).filter(|_| rings()).count();
+        assert!((1840..1980).contains(&rung), "{rung}");
+    }
 
     #[test]
     fn a_number_among_others_is_judged_by_student_s_law() {
