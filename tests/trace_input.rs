@@ -208,6 +208,53 @@ fn positions_in_millimetres_are_refused() {
 }
 
 #[test]
+fn laps_that_declare_no_direction_were_driven_as_the_model_says() {
+    let scratch = Scratch::new();
+    let backward = ["--set", "run.direction=\"counter-clockwise\""];
+    let drive = [
+        "drive",
+        "roduit2007",
+        "--runs",
+        "1",
+        "--laps",
+        "2",
+        "--out",
+        "set",
+        "--quiet",
+    ];
+    scratch.done([&drive[..], &backward].concat());
+    let description = scratch.read("set/dataset.toml");
+    let (undeclared, _) = description.split_once("[declared").unwrap();
+    scratch.write("set/dataset.toml", undeclared);
+    let sweep = [
+        "sweep",
+        "roduit2007",
+        "--vary",
+        "slip.level=0.1",
+        "--runs",
+        "1",
+        "--measured",
+        "set",
+        "--out",
+        "out",
+        "--quiet",
+    ];
+    scratch.done([&sweep[..], &backward].concat());
+    let refused = "set/run_a.csv: 0 whole laps, and the first is not analysed: at least two are needed, and four to trace; check the \
+                   world, the driving direction (clockwise; [declared] run.direction in dataset.toml) and the unit of x_m and y_m";
+    scratch.refuses(&sweep, refused);
+    // What a data set declares comes before what the model says.
+    let declared = "[declared]\nrun.direction = \"clockwise\"\n";
+    scratch.write("set/dataset.toml", format!("{undeclared}{declared}"));
+    let ran = scratch.run([&sweep[..], &backward].concat());
+    assert!(
+        ran.stderr.contains("the driving direction (clockwise;"),
+        "{}",
+        ran.stderr
+    );
+}
+
+#[test]
 fn times_in_milliseconds_are_refused() {
     let scratch = Scratch::new();
     few_laps(&[3]).record(&scratch, "set");
