@@ -32,6 +32,11 @@ impl Tried {
         }
     }
 
+    /// What was descended from.
+    pub(super) fn starts(&self) -> &[Hypothesis] {
+        &self.starts
+    }
+
     /// Where descents led.
     pub(super) fn descents(&self) -> &[Descent] {
         &self.descents

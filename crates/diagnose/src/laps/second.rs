@@ -5,7 +5,7 @@ use super::hypothesis::Hypothesis;
 use super::pairs::Tried;
 use super::rounds::{ROUNDS_BESIDE, ROUNDS_OF_LITTLE, best_of};
 use super::screen::Screened;
-use super::search::{Found, Search};
+use super::search::{BASES, Found, Search, of_other_effects};
 use super::verdict::{ALL_BUT_FAULTS, faults_beside, is_worth_its_numbers, stands_alone, suffices};
 
 /// What could go with a single effect, by what it explains of that one's remainder.
@@ -68,6 +68,11 @@ impl Search<'_> {
                 }
             }
         }
+        // A further effect may do more beside another single one than what the first is ahead.
+        if self.is_strong() && !single.explanation.fits() && !jumps && !tried.fits() {
+            let beside = self.beside_next(found, tried.starts());
+            self.descend_on(&mut tried, beside);
+        }
         // Two effects that have nothing of the single one may do together what it does nearly.
         if self.lacks_more_than_faults(single) && !tried.fits() {
             self.try_together(&mut tried);
@@ -79,10 +84,25 @@ impl Search<'_> {
         self.with_exchanged_beside(tried, certain)
     }
 
+    /// Others than the first of some single effects that explain nearly as much, with what explains best what they leave.
+    fn beside_next(&self, found: &[Found], tried: &[Hypothesis]) -> Vec<Hypothesis> {
+        let least = found
+            .first()
+            .map_or(0.0, |first| NEARLY * first.explanation.score);
+        let mut all = tried.to_vec();
+        let others = of_other_effects(found.iter()).into_iter().skip(1).take(BASES);
+        for other in others.filter(|other| other.explanation.score > least) {
+            self.tell(format_args!("what is beside {}", other.explanation.label()));
+            let base = self.trial.base(other.hypothesis.clone());
+            let beside = self.beside(&base, &other.left, &all);
+            all.extend(beside);
+        }
+        all.split_off(tried.len())
+    }
+
     /// The probe of the first of some single effects, where the best of several effects has it and leaves nothing significant, and no other
     /// single effect explains nearly as much: it is not to be exchanged for others.
     fn certain_in(tried: &Tried, found: &[Found]) -> Option<usize> {
-        const NEARLY: f64 = 0.97;
         let (first, others) = found.split_first()?;
         let score = |found: &Found| found.explanation.score;
         let is_rival = |other: &Found| {
@@ -154,6 +174,9 @@ impl Search<'_> {
         (closer.explanation.score > found.explanation.score + BETTER).then_some(closer)
     }
 }
+
+/// Share of the best one's score above which another single effect explains nearly as much.
+const NEARLY: f64 = 0.97;
 
 /// A fair share of what the faults of models may gain beside a single effect.
 fn fair_share_of_faults(single: &Found) -> f64 {
