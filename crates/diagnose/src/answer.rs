@@ -62,6 +62,11 @@ impl Explanation {
             .collect()
     }
 
+    /// How many of its effects are on noise.
+    pub fn noises(&self) -> usize {
+        self.names().into_iter().filter(|name| is_noise(name)).count()
+    }
+
     /// How many numbers were fitted.
     pub(crate) fn fitted(&self) -> usize {
         self.effects.iter().map(|effect| effect.fitted).sum()
@@ -123,7 +128,12 @@ impl Explanation {
 }
 
 /// Log-likelihood within which explanations are alternatives.
-pub(crate) const ALTERNATIVE: f64 = 5.0;
+pub const ALTERNATIVE: f64 = 5.0;
+
+/// Whether an effect changes nothing but chance.
+pub(crate) fn is_noise(name: &str) -> bool {
+    ["slip-level", "slip-memory", "reading-noise", "camera-noise"].contains(&name)
+}
 
 /// How many of the first explanations, best first, data do not tell from the best: of as many effects, with a cause without a
 /// name if it has one, and not so far behind.

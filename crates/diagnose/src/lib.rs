@@ -14,7 +14,7 @@ mod response_fit;
 mod sightings;
 mod slip;
 
-pub use answer::{Answer, Cause, Explanation, Verdict};
+pub use answer::{ALTERNATIVE, Answer, Cause, Explanation, Verdict};
 pub use candidate::Candidate;
 pub use corners::{Corners, other_cuts};
 pub use detectable::Detectable;

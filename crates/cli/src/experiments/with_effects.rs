@@ -4,7 +4,7 @@ use anyhow::Result;
 use pdm::Cluster;
 use rayon::prelude::*;
 use serde_json::{Value, json};
-use sim::{Pattern, Setting};
+use sim::Setting;
 
 use super::comparison::Comparison;
 use super::distances::{DistanceOf, Distances, Row};
@@ -73,8 +73,7 @@ pub(crate) fn tables(
 
 /// As how many different runs the effects act.
 fn acting_runs(study: &Study, effects: &[Setting]) -> usize {
-    let by_run = |effect: &Setting| matches!(effect.pattern, Pattern::ByRun(_));
-    if effects.iter().any(by_run) {
+    if effects.iter().any(Setting::goes_by_run) {
         study.real.len()
     } else {
         1

@@ -5,7 +5,7 @@ use diagnose::{
     Answer, Atlas, Baselines, Departures, Detectable, Explanation, Extent, LogDiagnosis, LoggedRun,
     ObservedRun, Verdict, Watch, diagnose_logs,
 };
-use sim::{Pattern, Setting, Vec2};
+use sim::{Setting, Vec2};
 
 use super::atlas::{Purpose, atlas};
 use super::cache::Cache;
@@ -135,7 +135,7 @@ impl<'a> TracedLaps<'a> {
         let settings = found.answer.settings();
         let (residual, after) = self.confirm(&settings)?;
         let mut confirmed = found.answer.agrees_with(&residual, after.as_ref());
-        let goes_by_run = (settings.iter()).any(|setting| matches!(setting.pattern, Pattern::ByRun(_)));
+        let goes_by_run = settings.iter().any(Setting::goes_by_run);
         if !confirmed && goes_by_run && logs.recordings.len() < self.recordings.len() {
             let (before, after) = logged()?.confirm(&settings)?;
             confirmed = found.answer.agrees_with(&before, after.as_ref());

@@ -6,7 +6,7 @@ use std::ops::Range;
 use anyhow::Result;
 use diagnose::{Answer, MeanBeginning, MeanLaps, Unseen};
 use rayon::prelude::*;
-use sim::{Pattern, Setting, Streams};
+use sim::{Setting, Streams};
 use track::Lap;
 
 use super::beginnings::{Beginnings, simulated_beginning};
@@ -181,10 +181,7 @@ impl Judged<'_> {
         let starts = self.starts(&recording.beginnings)?;
         let mut errors = self.errors(&all, runs.clone(), &beside, starts);
         let settings = self.answer.settings();
-        if settings
-            .iter()
-            .any(|setting| matches!(setting.pattern, Pattern::ByRun(_)))
-        {
+        if settings.iter().any(Setting::goes_by_run) {
             let own = |(at, run): (usize, &SampledRun)| {
                 Ok(simulated(&settings, at..at + 1)?.distance_m(&run.offsets_m()))
             };
@@ -269,6 +266,11 @@ struct Beside<'a> {
 type LapsOf = for<'a> fn(&'a Beside<'a>) -> &'a MeanLaps;
 
 impl LapTimes {
+    /// How much longer simulated laps take before and after, s.
+    pub(crate) fn longer_s(&self) -> [f64; 2] {
+        [self.before_s, self.after_s].map(|simulated_s| simulated_s - self.measured_s)
+    }
+
     fn of(held_out: &[SampledRun], beside: &[Beside<'_>]) -> Self {
         let measured_s: Vec<f64> = held_out.iter().flat_map(SampledRun::lap_times_s).collect();
         let laps = measured_s.len() as f64;

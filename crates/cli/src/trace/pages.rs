@@ -10,7 +10,7 @@ use candidates::candidates;
 use departures::residual;
 pub(crate) use in_words::{cause_in_words, described, summary};
 
-use super::errors::{Eq8, LapTimes};
+use super::errors::Eq8;
 use super::limits::{innovations, limits, next_experiment, stages};
 use super::{Trace, pictures};
 use crate::experiments::{Block, Picture, Section};
@@ -148,18 +148,12 @@ fn error_table(trace: &Trace) -> Table {
                 "-".into(),
             ]));
         }
-        let LapTimes {
-            measured_s,
-            before_s,
-            after_s,
-            chance_s,
-        } = errors.lap_times;
-        let [before, after] = [before_s, after_s].map(|s| format!("{:+.2}", s - measured_s));
+        let [before, after] = errors.lap_times.longer_s().map(|s| format!("{s:+.2}"));
         table.push(of_answer([
             format!("{of}lap time, s off"),
             before,
             after,
-            format!("{chance_s:.2}"),
+            format!("{:.2}", errors.lap_times.chance_s),
         ]));
         if let Some(starts) = &errors.starts {
             let [before, after, chance] = starts.errors_mm().map(|mm| format!("{mm:.2}"));

@@ -1,7 +1,6 @@
 //! What a reader must know of the data.
 
 use diagnose::{Answer, LogRow};
-use sim::Pattern;
 
 use super::logs::Logs;
 use super::recording::{Recording, runs};
@@ -10,8 +9,10 @@ use crate::laps::SampledRun;
 /// What the error after means where sizes go by run.
 pub(super) fn sizes_by_run_in_words(answer: &Answer) -> Option<String> {
     let claimed = answer.claimed()?;
-    let by_run =
-        (claimed.effects.iter()).filter(|effect| matches!(effect.setting.pattern, Pattern::ByRun(_)));
+    let by_run = claimed
+        .effects
+        .iter()
+        .filter(|effect| effect.setting.goes_by_run());
     let names: Vec<&str> = by_run.map(|effect| effect.setting.spec.name).collect();
     (!names.is_empty()).then(|| {
         format!(

@@ -12,7 +12,7 @@ use super::parabola::groups;
 use super::part::{Freedom, Part};
 use super::path::Node;
 use super::screen::{Screened, without_directions};
-use super::search::{Search, WEAK};
+use super::search::{Found, Search, WEAK};
 use super::simulated::Draws;
 use super::trial::Trial;
 
@@ -323,6 +323,22 @@ impl Search<'_> {
         let (multiple, gain) = explains(&difference(&without, &with), &without, false);
         let narrower = deviance(&before, &without_before) - deviance(&after, &without);
         (multiple, gain + 0.5 * narrower)
+    }
+
+    /// Explanations with the effects that explain best what each of them leaves, but for those hypotheses that were tried.
+    pub(super) fn beside_found<'f>(
+        &self,
+        bases: impl Iterator<Item = &'f Found>,
+        tried: &[Hypothesis],
+    ) -> Vec<Hypothesis> {
+        let mut all = tried.to_vec();
+        for found in bases {
+            self.tell(format_args!("what is beside {}", found.explanation.label()));
+            let base = self.trial.base(found.hypothesis.clone());
+            let beside = self.beside(&base, &found.left, &all);
+            all.extend(beside);
+        }
+        all.split_off(tried.len())
     }
 
     /// Effects with those that explain best what each of them leaves, but for those pairs that were tried: actions do not quite add up,

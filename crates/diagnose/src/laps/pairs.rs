@@ -109,13 +109,8 @@ impl Search<'_> {
             self.try_together(&mut tried);
         }
         if !tried.fits() {
-            let mut known = tried.starts.clone();
-            for single in of_other_effects(singles.iter()).into_iter().take(BASES) {
-                let base = self.trial.base(single.hypothesis.clone());
-                let beside = self.beside(&base, &single.left, &known);
-                known.extend(beside);
-            }
-            let further = known.split_off(tried.starts.len());
+            let singles = of_other_effects(singles.iter()).into_iter().take(BASES);
+            let further = self.beside_found(singles, &tried.starts);
             self.descend_on(&mut tried, further);
         }
         if !tried.fits() && !jumps_first && !self.explains_most(&tried) {

@@ -15,7 +15,7 @@ use super::screen::price;
 use super::simulated::Evaluated;
 use super::tests_of_fit::{Departures, HOPELESS_P, SIGNIFICANT_P};
 use super::trial::Trial;
-use super::verdict::is_noise;
+use crate::answer::is_noise;
 
 /// What is simulated in a round of a descent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -25,7 +25,7 @@ use super::steadiness::Settling;
 use super::tests_of_fit::{Departures, Quadratic, SIGNIFICANT_P};
 use super::together::ScreenedPair;
 use super::trial::Trial;
-use super::verdict::is_noise;
+use crate::answer::is_noise;
 use crate::{Candidate, Explanation, Watch};
 
 /// An explanation and what simulates it.
@@ -265,21 +265,11 @@ impl Search<'_> {
         const WORTH: f64 = 0.95;
         /// Pairs beside which a third effect is sought: the second one of several may do about the same and stand for it.
         const BASES_OF_THREE: usize = 2 * BASES;
-        let mut starts: Vec<Hypothesis> = Vec::new();
         let bases = of_other_effects(best);
         let score = |found: &Found| found.explanation.score;
         let least = bases.first().map_or(0.0, |first| WORTH * score(first));
-        for base in bases
-            .into_iter()
-            .take(BASES_OF_THREE)
-            .filter(|base| score(base) >= least)
-        {
-            let left = &base.left;
-            self.tell(format_args!("what is beside {}", base.explanation.label()));
-            let base = self.trial.base(base.hypothesis.clone());
-            let further = self.beside(&base, left, &starts);
-            starts.extend(further);
-        }
+        let bases = bases.into_iter().take(BASES_OF_THREE);
+        let starts = self.beside_found(bases.filter(|base| score(base) >= least), &[]);
         self.settle(self.descend_several(&starts, &ROUNDS_BESIDE, f64::NEG_INFINITY))
     }
 

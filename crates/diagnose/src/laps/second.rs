@@ -89,15 +89,8 @@ impl Search<'_> {
         let least = found
             .first()
             .map_or(0.0, |first| NEARLY * first.explanation.score);
-        let mut all = tried.to_vec();
         let others = of_other_effects(found.iter()).into_iter().skip(1).take(BASES);
-        for other in others.filter(|other| other.explanation.score > least) {
-            self.tell(format_args!("what is beside {}", other.explanation.label()));
-            let base = self.trial.base(other.hypothesis.clone());
-            let beside = self.beside(&base, &other.left, &all);
-            all.extend(beside);
-        }
-        all.split_off(tried.len())
+        self.beside_found(others.filter(|other| other.explanation.score > least), tried)
     }
 
     /// The probe of the first of some single effects, where the best of several effects has it and leaves nothing significant, and no other

@@ -118,24 +118,13 @@ pub(super) fn verdict_of(best: &Explanation) -> Verdict {
 
 /// Whether an explanation needs several effects on noise: they are more likely one that has no name.
 pub(super) fn heaps_noise(explanation: &Explanation) -> bool {
-    noises(explanation) > 1
-}
-
-/// The number of effects on noise.
-fn noises(explanation: &Explanation) -> usize {
-    let names = explanation.names();
-    names.iter().filter(|name| is_noise(name)).count()
-}
-
-/// Whether an effect changes nothing but chance.
-pub(super) fn is_noise(name: &str) -> bool {
-    ["slip-level", "slip-memory", "reading-noise", "camera-noise"].contains(&name)
+    explanation.noises() > 1
 }
 
 /// Whether an explanation by noise leaves something surely: in units of its own scatter all that is left is little, and the share that it
 /// explains says nothing.
 pub(super) fn hides_what_is_left(best: &Explanation) -> bool {
-    best.names().into_iter().any(is_noise) && !best.leaves_more_likely_than(SURELY_P)
+    best.noises() > 0 && !best.leaves_more_likely_than(SURELY_P)
 }
 
 /// More effects come before fewer only if each number of the further ones gains enough, and if they fit where the fewer do
@@ -147,7 +136,7 @@ pub(super) fn preferred(fewer: Vec<Found>, more: Vec<Found>) -> Vec<Found> {
     let (a, b) = (&first.explanation, &further.explanation);
     let (gained, numbers) = gained_by(a, b);
     // Noise that is too large covers what it does not explain.
-    let covered = if noises(a) > 0 { AS_GOOD } else { 0.0 };
+    let covered = if a.noises() > 0 { AS_GOOD } else { 0.0 };
     let better = b.fits() || b.share >= ALL_BUT || !suffices(a) && b.share > a.share - covered;
     let worth = if suffices(a) { WORTH_BESIDE } else { WORTH };
     let faults = if b.fits() { faults_beside(a) } else { a.faults() };

@@ -53,6 +53,11 @@ impl Setting {
         }
     }
 
+    /// Whether it has values of its own for each run.
+    pub fn goes_by_run(&self) -> bool {
+        matches!(self.pattern, Pattern::ByRun(_))
+    }
+
     /// An effect with the same values always.
     pub fn constant(spec: &'static Spec, values: impl Into<Vec<f64>>) -> Self {
         Self {

@@ -1,6 +1,6 @@
 //! What a trace tried.
 
-use diagnose::{Cause, Explanation, Verdict};
+use diagnose::{ALTERNATIVE, Cause, Explanation, Verdict};
 
 use super::in_words::{described, size};
 use crate::experiments::Block;
@@ -77,12 +77,10 @@ pub(super) fn candidates(trace: &Trace) -> Vec<Block> {
 
 /// Why explanations come in an order that is not that of their scores, as far as they do.
 fn order_in_words(rivals: &[Explanation], others: &[&Explanation]) -> Option<String> {
-    /// Units within which explanations are alternatives whatever the error.
-    const NEAR: f64 = 5.0;
     let first = rivals.first()?;
     let best = rivals.iter().map(|e| e.score).fold(first.score, f64::max);
     let behind = rivals.iter().map(|e| best - e.score).fold(0.0, f64::max);
-    let far = (behind > NEAR).then(|| {
+    let far = (behind > ALTERNATIVE).then(|| {
         format!(
             "Of those marked * some are up to {behind:.1} units behind: likelihoods are simulated, and that is within twice their error."
         )

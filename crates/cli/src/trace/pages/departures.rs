@@ -78,7 +78,7 @@ fn departures_in_words(trace: &Trace) -> String {
     } else {
         " Nothing here exceeds chance.".to_owned()
     };
-    let later_s = errors.lap_times.measured_s - errors.lap_times.before_s;
+    let later_s = -errors.lap_times.longer_s()[0];
     let than = if later_s > 0.0 { "longer" } else { "shorter" };
     // Of several data sets the numbers are those of all, and the map is one's.
     let times = (departing.contains(&"mean") && !path_departs && trace.recordings.len() == 1).then(|| {

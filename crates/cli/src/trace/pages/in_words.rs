@@ -139,7 +139,6 @@ fn unexplained(trace: &Trace) -> String {
 
 /// How much the best explanation by listed effects explains, and why it is not claimed; `None` where none was fitted.
 fn best_listed(trace: &Trace) -> Option<String> {
-    const NOISE: [&str; 4] = ["slip-level", "slip-memory", "reading-noise", "camera-noise"];
     let answer = &trace.answer;
     let is_listed = |e: &&Explanation| {
         e.effects
@@ -150,7 +149,6 @@ fn best_listed(trace: &Trace) -> Option<String> {
     let stalls = (answer.explanations[..answer.indistinguishable].iter())
         .find(|e| is_listed(e) && e.effects.len() == 2 && e.names().contains(&"wheel-scale"))
         .filter(|e| e.names().contains(&"slip-level"));
-    let noises = best.names().iter().filter(|name| NOISE.contains(name)).count();
     let why = match (&answer.cause, best.remainder_p.filter(|_| !best.fits())) {
         (Some(cause), _) if cause.depends_on == "chance" && stalls.is_some() => {
             "but a slower wheel and more slip are what a wheel does that stands still now and then: one cause without a name rather \
@@ -158,7 +156,7 @@ fn best_listed(trace: &Trace) -> Option<String> {
                 .to_owned()
         }
         (Some(_), _) => "but what it leaves shows a cause without a name".to_owned(),
-        _ if noises > 1 => {
+        _ if best.noises() > 1 => {
             "but with several effects on noise, which are more likely one cause without a name".to_owned()
         }
         (None, Some(p)) => format!(
