@@ -5,11 +5,13 @@ use sim::Setting;
 
 use super::atlas::{Atlas, PATH_SETS, Simulate, White};
 use super::diagnosis::ALARM_SCORE;
-use super::probe::Probe;
 use super::screen::price;
 use super::trial::Trial;
 use crate::candidate::label;
 use crate::detectable::{Detectable, QUANTILE_95};
+
+/// Multiples of a size that jumps at all of which it has to be seen: what one rounding does, one a little larger may not.
+const ABOUT: [f64; 3] = [1.0, 1.04, 1.09];
 
 /// Sizes and what they do, from nothing outwards.
 type Outwards<'a> = [(f64, &'a White)];
@@ -41,11 +43,21 @@ impl Atlas {
             let size = if p.quantum.is_some() {
                 let seen = own.iter().find(|(_, action)| action.norm() >= needed);
                 seen.map(|(size, _)| *size)
-            } else if p.odd || self.has_others_like(p) {
+            } else if p.odd {
                 smallest(&own, needed)
             } else {
                 let signal = |size: f64| trial.signal_of(&p.setting(p.neutral + sign * size), directions);
-                smallest_simulated(&own, needed, signal)
+                if p.scanned > 0 {
+                    let about = |size: f64| {
+                        ABOUT
+                            .iter()
+                            .map(|times| signal(times * size))
+                            .reduce(|a, b| Some(a?.min(b?)))?
+                    };
+                    bracketed(&own, needed, about).map(|bracket| bracket.high.0)
+                } else {
+                    bracketed(&own, needed, signal).map(|bracket| bracket.size(needed))
+                }
             };
             size.map(|size| p.neutral + sign * size)
         };
@@ -59,11 +71,6 @@ impl Atlas {
         })
     }
 
-    /// Whether the same effect acts at other sensors, places or in other directions: these paths are about straight.
-    fn has_others_like(&self, probe: &Probe) -> bool {
-        self.probes.iter().filter(|other| other.acts_like(probe)).count() > 1
-    }
-
     /// Standard deviations of a signal that raises the alarm in 95 of 100 cases.
     fn needed(&self, numbers: usize) -> f64 {
         (2.0 * (ALARM_SCORE + price(numbers, self.layout.total_laps()))).sqrt() + QUANTILE_95
@@ -72,53 +79,88 @@ impl Atlas {
 
 impl Trial<'_> {
     /// How far an effect brings laps from the declared model along the direction that shows it best, in standard deviations; `None`
-    /// where the robot crashes.
+    /// where the robot crashes. What one data set shows best is measured by another: the largest of hundreds of directions is
+    /// otherwise one of chance.
     fn signal_of(&self, effect: &Setting, directions: &[White]) -> Option<f64> {
-        /// Data sets by which no path was simulated.
-        const SETS: [u64; 2] = [PATH_SETS, PATH_SETS + 1];
         let effect = std::slice::from_ref(effect);
-        let mut action = White::zeros(self.atlas.layout.len());
-        for set in SETS {
-            action += self.kept_action(effect, set)? / SETS.len() as f64;
-        }
-        Some(
-            directions
+        // No path was simulated by these.
+        let one = self.kept_action(effect, PATH_SETS)?;
+        let other = self.kept_action(effect, PATH_SETS + 1)?;
+        let along = |shown_best_by: &White, action: &White| {
+            let best = directions
                 .iter()
-                .map(|along| along.dot(&action))
-                .fold(0.0, f64::max),
-        )
+                .max_by(|a, b| a.dot(shown_best_by).total_cmp(&b.dot(shown_best_by)));
+            best.map_or(0.0, |best| best.dot(action))
+        };
+        Some((0.5 * (along(&one, &other) + along(&other, &one))).max(0.0))
     }
 }
 
-/// The smallest size along a path that need not be straight, as [`smallest`], where simulations of sizes ever closer tell `signal`s.
-fn smallest_simulated(path: &Outwards<'_>, needed: f64, signal: impl Fn(f64) -> Option<f64>) -> Option<f64> {
+/// A size that is not seen, if any is, and one that is, with their signals.
+#[derive(Debug, Clone, Copy)]
+struct Bracket {
+    low: Option<(f64, f64)>,
+    high: (f64, f64),
+}
+
+impl Bracket {
+    /// Where a signal that goes with a power of the size is as large as needed.
+    fn between(&self, needed: f64) -> f64 {
+        /// The power where only one size is known: between straight and curved.
+        const POWER: f64 = 1.5;
+        let Self { low, high } = *self;
+        let power = low.map_or(POWER, |low| {
+            (high.1 / low.1.max(LEAST * needed)).ln() / (high.0 / low.0).ln()
+        });
+        let size = high.0 * (needed / high.1).powf(1.0 / power);
+        low.map_or(size, |low| size.clamp(low.0, high.0))
+    }
+
+    /// The size that is not seen, if next to nothing is seen of it.
+    fn shows_nothing_at(&self, needed: f64) -> Option<f64> {
+        self.low.filter(|low| low.1 < LEAST * needed).map(|low| low.0)
+    }
+
+    /// The smallest size that is seen: where the signal begins all at once, the smallest at which it was there.
+    fn size(&self, needed: f64) -> f64 {
+        match self.shows_nothing_at(needed) {
+            Some(_) => self.high.0,
+            None => self.between(needed),
+        }
+    }
+}
+
+/// The least share of what is needed that is told from nothing.
+const LEAST: f64 = 0.2;
+
+/// Sizes on both sides of the smallest one along a path that is seen, as simulations of sizes ever closer tell `signal`s; `None` where
+/// the path ends before. A signal that begins all at once, as that of a dead band which the slowest command just enters, is looked at
+/// more closely.
+fn bracketed(path: &Outwards<'_>, needed: f64, signal: impl Fn(f64) -> Option<f64>) -> Option<Bracket> {
     const LOOKS: usize = 2;
+    /// The same, at a signal that begins all at once.
+    const LOOKS_AT_ONSET: usize = 6;
+    /// How close sizes on its two sides may come.
+    const CLOSE: f64 = 1.02;
     let seen = path.iter().position(|(_, action)| action.norm() >= needed)?;
     let of = |&(size, action): &(f64, &White)| (size, action.norm());
-    let mut low = seen.checked_sub(1).map(|before| of(&path[before]));
-    let mut high = of(&path[seen]);
-    for _ in 0..LOOKS {
-        let size = between(low, high, needed);
+    let mut bracket = Bracket {
+        low: seen.checked_sub(1).map(|before| of(&path[before])),
+        high: of(&path[seen]),
+    };
+    for look in 0..LOOKS_AT_ONSET {
+        let onset = bracket.shows_nothing_at(needed);
+        if look >= LOOKS && onset.is_none_or(|nothing| bracket.high.0 < CLOSE * nothing) {
+            break;
+        }
+        let size = bracket.between(needed);
         // A robot that crashes is seen.
         match signal(size).unwrap_or(f64::INFINITY) {
-            signal if signal < needed => low = Some((size, signal)),
-            signal => high = (size, signal.min(high.1)),
+            signal if signal < needed => bracket.low = Some((size, signal)),
+            signal => bracket.high = (size, signal.min(bracket.high.1)),
         }
     }
-    Some(between(low, high, needed))
-}
-
-/// The size of a signal between two of which one is smaller, if there is such, and one is not, where it goes with a power of the size.
-fn between(low: Option<(f64, f64)>, high: (f64, f64), needed: f64) -> f64 {
-    /// What it is where only one is known: between straight and curved.
-    const POWER: f64 = 1.5;
-    /// The least share of what is needed that is told from nothing.
-    const LEAST: f64 = 0.2;
-    let power = low.map_or(POWER, |low| {
-        (high.1 / low.1.max(LEAST * needed)).ln() / (high.0 / low.0).ln()
-    });
-    let size = high.0 * (needed / high.1).powf(1.0 / power);
-    low.map_or(size, |low| size.clamp(low.0, high.0))
+    Some(bracket)
 }
 
 /// The smallest size along a path, from nothing outwards, at which its action is as long as needed. The action is seen along the
@@ -154,12 +196,19 @@ mod tests {
     fn a_curved_path_is_seen_where_simulations_say() {
         let (near, far) = (White::from_vec(vec![8.0]), White::from_vec(vec![32.0]));
         let path = [(2.0, &near), (4.0, &far)];
+        let found = |path: &Outwards<'_>, needed: f64, signal: &dyn Fn(f64) -> Option<f64>| {
+            bracketed(path, needed, signal).map(|bracket| bracket.size(needed))
+        };
         // Twice the square of the size, which reaches 18 at 3 and 2 at 1.
         let square = |size: f64| Some(2.0 * size * size);
-        assert!((smallest_simulated(&path, 18.0, square).unwrap() - 3.0).abs() < 1e-9);
-        assert!((smallest_simulated(&path, 2.0, square).unwrap() - 1.0).abs() < 1e-2);
-        assert_eq!(smallest_simulated(&path, 40.0, square), None);
+        assert!((found(&path, 18.0, &square).unwrap() - 3.0).abs() < 1e-9);
+        assert!((found(&path, 2.0, &square).unwrap() - 1.0).abs() < 1e-2);
+        assert_eq!(found(&path, 40.0, &square), None);
         let crashes = |size: f64| (size < 1.2).then_some(2.0 * size * size);
-        assert!((smallest_simulated(&path, 2.0, crashes).unwrap() - 1.0).abs() < 0.1);
+        assert!((found(&path, 2.0, &crashes).unwrap() - 1.0).abs() < 0.1);
+        // One that begins at 2.3.
+        let begins = |size: f64| Some(if size < 2.3 { 0.0 } else { 40.0 });
+        let onset = found(&[(2.0, &White::zeros(1)), path[1]], 6.0, &begins).unwrap();
+        assert!((2.3..2.4).contains(&onset), "{onset}");
     }
 }
