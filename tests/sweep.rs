@@ -76,6 +76,11 @@ fn there_is_a_row_for_each_point_seed_and_run() {
         (is - mean).abs() < 1e-12,
         "{is} should be the mean {mean} of {of_c:?}"
     );
+    // What the runs are from one another, which a simulation as good as the robot would be from them.
+    for run in document["measured_runs"].as_array().unwrap() {
+        let own = run["distance_from_others"].as_f64().unwrap();
+        assert!(own > 0.0 && own < mean, "{run}");
+    }
     for name in ["o/distance.svg", "o/modes.svg"] {
         assert!(scratch.read(name).starts_with("<svg "), "{name}");
     }
@@ -265,6 +270,16 @@ fn what_cannot_be_swept_is_refused() {
             "slip.level=0,1.5",
             "",
             "--vary slip.level=1.5: slip.level = 1.5 is outside [0, 1]",
+        ),
+        (
+            "slip.level=0.1,0.10",
+            "",
+            "--vary slip.level=0.1,0.10: 0.10 is there twice; remove one",
+        ),
+        (
+            "slip.level=1",
+            "slip.level=0.5",
+            "slip.level is given by --set and by --vary; leave one out",
         ),
         (
             "slip.level=nan",

@@ -1,5 +1,7 @@
 //! `lapwing world`.
 
+use std::fs;
+
 use serde_json::json;
 
 use crate::support::{Scratch, repository};
@@ -59,4 +61,89 @@ fn pictures_are_written_where_they_are_asked_for() {
     for name in ["course/course.svg", "segments/segments.svg"] {
         assert!(scratch.read(name).starts_with("<svg "), "{name}");
     }
+}
+
+/// The shipped circuit in a mirror, where it is driven counter-clockwise.
+fn mirrored_world() -> String {
+    let text = fs::read_to_string(repository("worlds/roduit2007/world.toml")).unwrap();
+    let mut world: toml::Table = text.parse().unwrap();
+    world["direction"] = "counter-clockwise".into();
+    let width_m = world["arena"][0].as_float().unwrap();
+    for wall in world["wall"].as_array_mut().unwrap() {
+        for spline in wall["spline"].as_array_mut().unwrap() {
+            for point in spline["control_points"].as_array_mut().unwrap() {
+                point[0] = (width_m - point[0].as_float().unwrap()).into();
+            }
+        }
+    }
+    world.to_string()
+}
+
+/// Twice the area that a run's path goes round, positive counter-clockwise.
+fn area_gone_round(csv: &str) -> f64 {
+    let points: Vec<[f64; 2]> = csv
+        .lines()
+        .skip(1)
+        .map(|row| {
+            let numbers: Vec<f64> = row.split(',').map(|cell| cell.parse().unwrap()).collect();
+            [numbers[1], numbers[2]]
+        })
+        .collect();
+    points
+        .windows(2)
+        .map(|w| w[0][0] * w[1][1] - w[1][0] * w[0][1])
+        .sum()
+}
+
+#[test]
+fn a_robot_drives_round_as_its_world_says_unless_the_model_does() {
+    let scratch = Scratch::new();
+    scratch.write("mirrored.toml", mirrored_world());
+    let drive = [
+        "drive",
+        "roduit2007",
+        "--world",
+        "mirrored.toml",
+        "--runs",
+        "1",
+        "--laps",
+        "2",
+        "--out",
+    ];
+    scratch.done(drive.into_iter().chain(["as_the_world"]));
+    assert!(area_gone_round(&scratch.read("as_the_world/run_a.csv")) > 0.0);
+    let clockwise = ["clockwise", "--set", "run.direction=clockwise"];
+    scratch.done(drive.into_iter().chain(clockwise));
+    assert!(area_gone_round(&scratch.read("clockwise/run_a.csv")) < 0.0);
+    // Both are read back as they were driven.
+    let compared = scratch.json(["compare", "as_the_world", "clockwise", "--json"]);
+    for cluster in compared["clusters"].as_array().unwrap() {
+        assert_eq!(cluster["laps"], 2, "{cluster}");
+    }
+}
+
+#[test]
+fn a_folder_is_not_taken_for_the_shipped_world_of_its_name() {
+    let scratch = Scratch::new();
+    scratch.done([
+        "drive",
+        "roduit2007",
+        "--runs",
+        "1",
+        "--laps",
+        "2",
+        "--out",
+        "roduit2007",
+    ]);
+    scratch.done([
+        "drive",
+        "roduit2007",
+        "--runs",
+        "1",
+        "--laps",
+        "2",
+        "--out",
+        "again",
+    ]);
+    scratch.done(["world", "check", "roduit2007"]);
 }

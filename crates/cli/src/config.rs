@@ -62,10 +62,21 @@ words!(
     ControllerKind { Braitenberg = "braitenberg", RuleBased = "rule-based" });
 words!(
     /// Which way round the robot drives.
-    Direction { Clockwise = "clockwise", CounterClockwise = "counter-clockwise" });
+    Direction { World = "world", Clockwise = "clockwise", CounterClockwise = "counter-clockwise" });
 words!(
     /// How the parameters of an effect vary.
     Pattern { Run = "run", Time = "time" });
+
+impl Direction {
+    /// The way round a course: its own unless another is named.
+    pub(crate) fn on(self, course: &track::Course) -> track::Direction {
+        match self {
+            Self::World => course.direction,
+            Self::Clockwise => track::Direction::Clockwise,
+            Self::CounterClockwise => track::Direction::CounterClockwise,
+        }
+    }
+}
 
 /// `model.toml`: world, robot, sensors, controller, noise and further effects.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -44,7 +44,7 @@ impl SampledRun {
         wanted: usize,
         lost: impl Fn(usize) -> Option<String>,
     ) -> Self {
-        let mut laps = Vec::with_capacity(wanted);
+        let mut laps = Vec::new();
         let (mut set_aside, mut out_of_sight) = (Vec::new(), Vec::new());
         for (number, lap) in whole.iter().enumerate().skip(1) {
             if laps.len() == wanted {
@@ -221,7 +221,7 @@ fn sample(set: &DataSet, run: &RunFile, circuit: &Circuit, config: &Config) -> R
              driving direction ({}; [declared] run.direction in dataset.toml) and the unit of x_m and y_m",
             whole.len(),
             if whole.len() == 1 { "" } else { "s" },
-            config.run.direction.name()
+            config.run.direction.on(&circuit.course).name()
         );
     }
     Ok(sampled)

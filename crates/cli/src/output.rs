@@ -58,6 +58,7 @@ impl OutDir {
     /// `dir` is a file or a folder with anything but our results, or holds an input; `DIR.partial` is
     /// not ours, in use, or with `resume` of other work; the place cannot be written to.
     pub(crate) fn create(dir: &Path, work: &Work, inputs: &[Input], resume: bool) -> Result<Self> {
+        let dir = &behind_link(dir);
         let (partial, replaced) = (beside(dir, ".partial")?, beside(dir, ".replaced")?);
         recover(dir, &replaced)?;
         refuse_foreign(dir)?;
@@ -185,6 +186,13 @@ impl Drop for OutDir {
             let _ = remove_ours(&self.partial);
         }
     }
+}
+
+/// Where a link leads that a user has put in the place of a folder, which is then the one to be replaced.
+fn behind_link(dir: &Path) -> PathBuf {
+    let is_link = dir.symlink_metadata().is_ok_and(|there| there.is_symlink());
+    let target = is_link.then(|| fs::canonicalize(dir).ok()).flatten();
+    target.unwrap_or_else(|| dir.to_owned())
 }
 
 /// Removes a folder with its marker last: if that is cut short, it still shows to be ours.

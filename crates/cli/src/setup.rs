@@ -13,9 +13,7 @@ use toml::Value;
 use track::{Course, Lap, Way};
 
 use crate::args::ModelArgs;
-use crate::config::{
-    self, Combine, Config, ControllerKind, Direction, ModelFile, ModelSource, SensorKind, WorldSource,
-};
+use crate::config::{self, Combine, Config, ControllerKind, ModelFile, ModelSource, SensorKind, WorldSource};
 
 /// A checked model on its circuit, ready to drive.
 #[derive(Debug, Clone)]
@@ -129,10 +127,7 @@ pub(crate) fn course(source: &WorldSource) -> Result<Course> {
 
 /// The way round that a configuration names, on a course.
 pub(crate) fn way(config: &Config, course: &Course) -> Way {
-    course.way(match config.run.direction {
-        Direction::Clockwise => track::Direction::Clockwise,
-        Direction::CounterClockwise => track::Direction::CounterClockwise,
-    })
+    course.way(config.run.direction.on(course))
 }
 
 /// Whether a configuration states a model.
@@ -360,7 +355,7 @@ pub(crate) fn model_file(args: &ModelArgs) -> Result<ModelFile> {
     let shipped = config::WORLDS
         .iter()
         .any(|(name, _)| args.model == Path::new(name))
-        && !args.model.exists();
+        && !args.model.is_file();
     let source = if shipped {
         ModelSource::Embedded
     } else {

@@ -357,7 +357,7 @@ pub fn drive_from<'w>(
 ) -> Result<Drive, Error> {
     let mut run = Run::from_start(world, draws, start)?;
     let mut tracker = LapTracker::new(&world.circuit().gates, world.rules().way);
-    let mut done: Vec<Lap> = Vec::with_capacity(laps + 1);
+    let mut done: Vec<Lap> = Vec::new();
     let patience_s = world.rules().patience_laps * world.nominal_lap_s();
     let mut latest_s = run.start_s;
     let timed_out = loop {

@@ -29,7 +29,7 @@ pub(crate) fn run(session: &Session, args: &World) -> Result<()> {
 
 /// A file if there is one, else the shipped world of that name.
 fn source(world: &Path) -> Result<WorldSource> {
-    if world.exists() {
+    if world.is_file() {
         return world_source("", None, Some(world));
     }
     world_source(&world.to_string_lossy(), None, None)

@@ -78,9 +78,14 @@ impl ModelFile {
         self.document.line_of(key)
     }
 
+    /// Whether `--set` gives this key or a table or array around it.
+    pub(crate) fn is_set(&self, key: &str) -> bool {
+        self.set_of(key).is_some()
+    }
+
     /// Whether the file or the command line names this key, rather than leaving it out.
     pub(crate) fn names(&self, key: &str) -> bool {
-        self.set_of(key).is_some() || self.path.is_some() && self.line_of(key).is_some()
+        self.is_set(key) || self.path.is_some() && self.line_of(key).is_some()
     }
 
     /// The message with the place where its key was set: `FILE:LINE: message`.

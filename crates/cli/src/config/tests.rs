@@ -306,7 +306,7 @@ prop_compose! {
         tiny in proptest::num::f64::NORMAL | proptest::num::f64::SUBNORMAL | proptest::num::f64::ZERO,
         rays in 0..1000_usize,
         table in proptest::collection::vec(proptest::array::uniform2(0.0..1e4_f64), 0..4),
-        words in (0..2_usize, 0..2_usize, 0..2_usize, 0..2_usize),
+        words in (0..2_usize, 0..2_usize, 0..2_usize, 0..3_usize),
         world in prop_oneof![word(proptest::char::range(' ', '~'), 0..=12), word(any::<char>(), 0..=6)],
         effects in proptest::collection::vec(any_effect(), 0..3),
     ) -> Config {
@@ -323,7 +323,7 @@ prop_compose! {
         config.sensor.kind = [SensorKind::Improved, SensorKind::Original][words.0];
         config.sensor.combine = [Combine::Responses, Combine::Distances][words.1];
         config.controller.kind = [ControllerKind::Braitenberg, ControllerKind::RuleBased][words.2];
-        config.run.direction = [Direction::Clockwise, Direction::CounterClockwise][words.3];
+        config.run.direction = [Direction::World, Direction::Clockwise, Direction::CounterClockwise][words.3];
         config.effect = effects;
         config
     }

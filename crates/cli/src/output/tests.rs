@@ -280,3 +280,20 @@ fn a_folder_with_a_file_of_its_users_is_not_replaced() {
     fs::remove_file(&note).unwrap();
     write();
 }
+
+#[cfg(unix)]
+#[test]
+fn behind_a_link_its_target_is_replaced() {
+    let home = TempDir::new().unwrap();
+    let (dir, link) = (home.path().join("report"), home.path().join("link"));
+    let write = |dir: &Path, text: &str| {
+        let out = OutDir::create(dir, &work(0.1), &[], false).unwrap();
+        out.write("a.txt", text).unwrap();
+        out.finish(&manifest()).unwrap();
+    };
+    write(&dir, "earlier");
+    std::os::unix::fs::symlink(&dir, &link).unwrap();
+    write(&link, "later");
+    assert!(link.symlink_metadata().unwrap().is_symlink());
+    assert_eq!(fs::read_to_string(dir.join("a.txt")).unwrap(), "later");
+}

@@ -86,10 +86,8 @@ impl Experiment {
 /// What to set for a lap experiment: words, and keys of the model with their values.
 fn ideas(config: &Config, setup: &Setup) -> Vec<(String, Vec<(&'static str, String)>)> {
     let mut ideas = vec![("more laps as they are".to_owned(), Vec::new())];
-    let backward = match config.run.direction {
-        crate::config::Direction::Clockwise => "counter-clockwise",
-        crate::config::Direction::CounterClockwise => "clockwise",
-    };
+    let driven = config.run.direction.on(&setup.scene.circuit().course);
+    let backward = driven.reversed().name();
     ideas.push((
         format!("{backward} laps"),
         vec![("run.direction", backward.to_owned())],

@@ -5,6 +5,7 @@ use pdm::{Cluster, Hotelling, Modes, Pdm, Projection};
 
 use super::Sweep;
 use super::unit::Unit;
+use crate::laps::mean_and_deviation;
 
 /// Distances are taken in so many modes, as in the paper's tables.
 pub(super) const MODES: usize = 2;
@@ -16,6 +17,8 @@ pub(super) struct SeedResult {
     pub(super) explained: Vec<f64>,
     /// Grid point by grid point, each against every measured run.
     pub(super) rows: Vec<Row>,
+    /// Of each measured run the mean distance from the others in the same model, or why there is none.
+    pub(super) among_measured: Vec<Result<f64, String>>,
     /// What a user must know of laps that are not there.
     pub(super) remarks: Vec<String>,
 }
@@ -99,6 +102,9 @@ pub(super) fn compare(sweep: &Sweep, seed: usize, units: &[Unit]) -> Result<Seed
             });
         }
     }
+    let among_measured = (0..measured.len())
+        .map(|run| from_the_others(&measured, run))
+        .collect();
     let remark = |text: &String| format!("seed {number}: {text}");
     let remarks = units
         .iter()
@@ -110,6 +116,19 @@ pub(super) fn compare(sweep: &Sweep, seed: usize, units: &[Unit]) -> Result<Seed
         seed: number,
         explained: clusters.pdm.explained(),
         rows,
+        among_measured,
         remarks,
     })
+}
+
+/// The mean distance of one measured run from the others: what a simulation as good as the robot itself would have.
+fn from_the_others(measured: &[Projection], run: usize) -> Result<f64, String> {
+    let others = measured.iter().enumerate().filter(|(other, _)| *other != run);
+    let distances: Vec<f64> = others
+        .map(|(_, other)| pdm::distance(&measured[run], other).map_err(|error| error.to_string()))
+        .collect::<Result<_, _>>()?;
+    if distances.is_empty() {
+        return Err("there is no other measured run".to_owned());
+    }
+    Ok(mean_and_deviation(&distances).0)
 }

@@ -60,6 +60,11 @@ impl Grid {
                 "--vary {} is given twice; put all its values into one",
                 axis.key
             );
+            ensure!(
+                !base.file.is_set(&axis.key),
+                "{key} is given by --set and by --vary; leave one out",
+                key = axis.key
+            );
         }
         let mut scenes = BTreeMap::new();
         let points = combinations(&axes)
@@ -105,8 +110,9 @@ impl Axis {
                 !value.is_empty(),
                 "--vary {text}: there is nothing between two commas; remove one"
             );
+            let same = |other: &String| json_value(other) == json_value(value);
             ensure!(
-                !values[..i].contains(value),
+                !values[..i].iter().any(same),
                 "--vary {text}: {value} is there twice; remove one"
             );
         }

@@ -45,7 +45,7 @@ pub(super) fn document(sweep: &Sweep, results: &[SeedResult]) -> Value {
     json!({
         "vary": sweep.grid.axes_json(),
         "measured": sweep.measured.set.name,
-        "measured_runs": sweep.measured.runs.iter().map(|run| json!({ "run": run.run, "laps": run.laps.len() })).collect::<Vec<_>>(),
+        "measured_runs": (0..sweep.measured.runs.len()).map(|run| measured_json(sweep, results, run)).collect::<Vec<_>>(),
         "runs": sweep.runs,
         "laps": sweep.laps,
         "gates": sweep.circuit().gates.len(),
@@ -110,12 +110,23 @@ pub(super) fn spread(results: &[SeedResult], point: usize, run: Option<usize>) -
             .collect();
         (!distances.is_empty()).then(|| mean_and_deviation(&distances).0)
     };
-    let distances: Vec<f64> = results.iter().filter_map(of_seed).collect();
-    let (mean, deviation) = mean_and_deviation(&distances);
-    Spread {
-        mean,
-        deviation,
-        seeds: distances.len(),
+    Spread::over(results.iter().filter_map(of_seed).collect())
+}
+
+/// The mean distances of a measured run from the others over the seeds.
+fn among_measured(results: &[SeedResult], run: usize) -> Spread {
+    let of_seed = |result: &SeedResult| result.among_measured[run].clone().ok();
+    Spread::over(results.iter().filter_map(of_seed).collect())
+}
+
+impl Spread {
+    fn over(distances: Vec<f64>) -> Self {
+        let (mean, deviation) = mean_and_deviation(&distances);
+        Self {
+            mean,
+            deviation,
+            seeds: distances.len(),
+        }
     }
 }
 
@@ -128,8 +139,18 @@ fn total(results: &[SeedResult], point: usize, count: fn(&Row) -> usize) -> usiz
         .sum()
 }
 
+fn finite(x: f64) -> Value {
+    if x.is_finite() { json!(x) } else { Value::Null }
+}
+
+/// A measured run, with its distance from the others.
+fn measured_json(sweep: &Sweep, results: &[SeedResult], run: usize) -> Value {
+    let measured = &sweep.measured.runs[run];
+    let others = among_measured(results, run).mean;
+    json!({ "run": measured.run, "laps": measured.laps.len(), "distance_from_others": finite(others) })
+}
+
 fn point_json(sweep: &Sweep, results: &[SeedResult], point: usize) -> Value {
-    let finite = |x: f64| if x.is_finite() { json!(x) } else { Value::Null };
     let run = |run: usize| {
         let s = spread(results, point, Some(run));
         json!({
@@ -158,7 +179,7 @@ pub(super) fn text(sweep: &Sweep, results: &[SeedResult]) -> String {
         _ => format!("; mean and standard deviation over {seeds} seeds, or over (so many) of them"),
     };
     let title = format!(
-        "Distance of each grid point from the runs of {} (eq. 8 in {MODES} modes{over})",
+        "Distance of each grid point from the runs of {} (eq. 8 in {MODES} modes of one model of all these points and runs{over})",
         sweep.measured.set.name
     );
     let mut columns: Vec<&str> = sweep.grid.axes.iter().map(|axis| axis.key.as_str()).collect();
@@ -180,7 +201,19 @@ pub(super) fn text(sweep: &Sweep, results: &[SeedResult]) -> String {
         ));
         table.push(row);
     }
-    table.to_text()
+    if runs.len() > 1 {
+        let axes = sweep.grid.axes.len();
+        let mut row = vec![String::new(); axes];
+        row[0] = "the other runs".to_owned();
+        row.extend((0..runs.len()).map(|run| cell(&among_measured(results, run), seeds)));
+        row.extend([String::new(), String::new()]);
+        table.push(row);
+    }
+    format!(
+        "{}Last row: the mean distance of a measured run from the others. In a grid of other points the modes, and with them all \
+         distances, are others.\n",
+        table.to_text()
+    )
 }
 
 /// Where only some of the seeds gave a distance, their number follows in brackets.
