@@ -39,6 +39,8 @@ pub struct Explanation {
     pub score: f64,
     /// Log-likelihood gained.
     pub gain: f64,
+    /// Its standard error by the simulations that tell it; 0 where none do.
+    pub gain_error: f64,
     /// Share of what exceeds the declared model's expectation that it explains, as it is estimated: the excess that remains
     /// scatters about nothing, and where there is little to explain the share is anything.
     pub share: f64,
@@ -77,6 +79,11 @@ impl Explanation {
         /// Share of what is explained.
         const FAULTS: f64 = 2e-4;
         FAULTS * self.gain
+    }
+
+    /// How far behind it another explanation has to be for data to tell the two apart: five units, and what simulations do not know.
+    pub(crate) fn tells_apart(&self) -> f64 {
+        (ALTERNATIVE + self.gain_error).max(2.0 * self.gain_error)
     }
 
     /// Whether a cause without a name is among the effects.
@@ -137,13 +144,10 @@ pub(crate) fn is_noise(name: &str) -> bool {
 
 /// How many of the first explanations, best first, data do not tell from the best: of as many effects, with a cause without a
 /// name if it has one, and not so far behind.
-pub(crate) fn indistinguishable<'a>(
-    explanations: impl Iterator<Item = &'a Explanation> + Clone,
-    behind: f64,
-) -> usize {
+pub(crate) fn indistinguishable<'a>(explanations: impl Iterator<Item = &'a Explanation> + Clone) -> usize {
     explanations.clone().next().map_or(0, |best| {
         let alike = |e: &&Explanation| {
-            e.score >= best.score - behind
+            e.score >= best.score - best.tells_apart()
                 && e.effects.len() == best.effects.len()
                 && e.has_no_name() == best.has_no_name()
         };
@@ -231,8 +235,9 @@ impl Answer {
         let explanations = self.explanations.iter();
         let mut further: Vec<&Explanation> = explanations.filter(|other| claimed.lacks_as(other)).collect();
         further.sort_by(|a, b| b.score.total_cmp(&a.score));
-        let best = further.first().map_or(f64::INFINITY, |best| best.score);
-        further.retain(|other| other.score >= best - ALTERNATIVE);
+        if let Some(best) = further.first().copied() {
+            further.retain(|other| other.score >= best.score - best.tells_apart());
+        }
         further
     }
 
@@ -325,6 +330,7 @@ mod tests {
             effects: vec![effect("wheel-scale", speed), effect("slip-level", slip)],
             score: 90.0,
             gain: 100.0,
+            gain_error: 0.0,
             share: 1.0,
             remainder_p: Some(0.5),
             remainder: None,

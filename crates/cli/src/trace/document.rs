@@ -253,7 +253,7 @@ pub(crate) fn parameters(effect: &Candidate) -> Vec<Value> {
 fn candidate(explanation: &Explanation, laps: Option<&Departures>) -> Value {
     json!({
         "names": explanation.names(), "label": explanation.label(),
-        "score": explanation.score, "gain": explanation.gain, "share": explanation.explained(laps),
+        "score": explanation.score, "gain": explanation.gain, "gain_error": explanation.gain_error, "share": explanation.explained(laps),
         "parameters": explanation.effects.iter().map(parameters).collect::<Vec<_>>(),
         "remainder": explanation.remainder.as_ref().map(departures), "remainder_p": explanation.remainder_p,
     })

@@ -18,7 +18,7 @@ use super::verdict::{
     is_claimed, is_doubtful, leaves_nothing_to_ask, preferred, stands_alone, suffices, unless_as_good,
     unless_named, verdict_of, with_first,
 };
-use crate::answer::{ALTERNATIVE, indistinguishable};
+use crate::answer::indistinguishable;
 use crate::{Answer, Cause, Error, Explanation, Verdict, Watch};
 
 /// Score of the best probe from which a data set counts as departing from the declared model, whatever the omnibus says.
@@ -88,9 +88,7 @@ impl Atlas {
             Some(ripple) => explain_ripple(&search, &screened, &ripple),
             None => explain(&search, search.singles(&screened)),
         };
-        // Candidates share their draws, so that much of the error is common to them: it counts where it is large.
-        let behind = ALTERNATIVE.max(2.0 * found.first().map_or(0.0, |best| best.gain_error));
-        let indistinguishable = indistinguishable(found.iter().map(|found| &found.explanation), behind);
+        let indistinguishable = indistinguishable(found.iter().map(|found| &found.explanation));
         explained_first(&mut found[..indistinguishable]);
         if verdict_of_first(&found) == Verdict::Explained {
             let equal = found[..indistinguishable].iter();
@@ -304,7 +302,7 @@ fn simplified(search: &Search<'_>, found: Vec<Found>) -> Vec<Found> {
     if best.effects.len() < 2 || best.has_no_name() || verdict_of(best) == Verdict::Unexplained {
         return found;
     }
-    let rivals = indistinguishable(found.iter().map(|found| &found.explanation), ALTERNATIVE);
+    let rivals = indistinguishable(found.iter().map(|found| &found.explanation));
     let mut fewer = search.simpler(found[..rivals].iter());
     if fewer.is_empty() {
         return found;

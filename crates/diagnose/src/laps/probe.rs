@@ -26,7 +26,7 @@ pub(super) struct Probe {
     /// Sizes to scan, in a constant ratio, where its action jumps with its size; 0 where it does not.
     pub(super) scanned: u32,
     /// Whether its size is a limit, which does the more the smaller it is and nothing where it is large.
-    limit: bool,
+    pub(super) limit: bool,
 }
 
 /// Share of a size over which its action is about linear.

@@ -37,8 +37,6 @@ pub(super) struct Found {
     /// How these go together.
     pub(super) correlation: DMatrix<f64>,
     pub(super) explanation: Explanation,
-    /// Standard deviation of its log-likelihood for the simulation's own error.
-    pub(super) gain_error: f64,
     /// What it leaves of the data, in units of the declared model's scatter.
     pub(super) left: White,
     /// The same in units of its own scatter and of the simulation's error.
@@ -425,7 +423,6 @@ impl Search<'_> {
         let atlas = self.atlas();
         let remainder = Departures::new(&refined.fit.residual, &atlas.layout);
         Found {
-            gain_error: refined.fit.gain_error,
             left: atlas.white(self.trial.data, &evaluated.expectation),
             residual: refined.fit.residual.clone(),
             hypothesis: refined.hypothesis.clone(),
@@ -435,6 +432,7 @@ impl Search<'_> {
                 effects: candidates(atlas, &refined.hypothesis, &refined.errors, &[], refined.fit.gain),
                 score: refined.score,
                 gain: refined.fit.gain,
+                gain_error: refined.fit.gain_error,
                 share: 1.0 - self.excess(&refined.fit.residual) / self.excess(self.residual),
                 remainder_p: Some(remainder.omnibus_p()),
                 remainder: Some(remainder),

@@ -228,6 +228,7 @@ mod tests {
             effects: names.iter().map(candidate).collect(),
             score,
             gain: score,
+            gain_error: 0.0,
             share,
             remainder_p: Some(remainder_p),
             remainder: None,

@@ -18,7 +18,7 @@ use super::rows::{LogRow, LoggedRun, bridged, without_logs};
 use super::search::{NOT_FAR, RIVAL, Search};
 use super::steps::{reading_step, written_step};
 use super::unnamed::Unnamed;
-use crate::answer::{ALTERNATIVE, indistinguishable};
+use crate::answer::indistinguishable;
 use crate::candidate::stage_of;
 use crate::corners::{Corners, EXACT};
 use crate::{Answer, Candidate, Cause, Detectable, Error, Explanation, Verdict, Watch};
@@ -222,6 +222,7 @@ impl Search<'_> {
         if explanations.is_empty() && !certain.is_empty() {
             explanations.push(Explanation {
                 gain: certain[0].gain,
+                gain_error: 0.0,
                 score: certain[0].gain,
                 effects: certain,
                 share: 1.0,
@@ -248,7 +249,7 @@ impl Search<'_> {
         } else {
             self.unnamed.as_ref().map(|unnamed| unnamed.cause.clone())
         };
-        let indistinguishable = indistinguishable(explanations.iter(), ALTERNATIVE);
+        let indistinguishable = indistinguishable(explanations.iter());
         let mut answer = Answer {
             verdict,
             explanations,
@@ -312,6 +313,7 @@ impl Search<'_> {
         Explanation {
             effects: certain.iter().cloned().chain(own).collect(),
             gain: refined.gain,
+            gain_error: 0.0,
             score: refined.score(),
             share: refined.gain / (refined.gain + self.left_beside(refined)).max(1e-9),
             remainder_p: was_looked_at.then_some(self.remainder.p),

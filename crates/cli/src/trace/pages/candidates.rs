@@ -82,7 +82,8 @@ fn order_in_words(rivals: &[Explanation], others: &[&Explanation]) -> Option<Str
     let behind = rivals.iter().map(|e| best - e.score).fold(0.0, f64::max);
     let far = (behind > ALTERNATIVE).then(|| {
         format!(
-            "Of those marked * some are up to {behind:.1} units behind: likelihoods are simulated, and that is within twice their error."
+            "Of those marked * some are up to {behind:.1} units behind: likelihoods are simulated, that of the first within {:.1}.",
+            first.gain_error
         )
     });
     let is_ahead = |other: &&&Explanation| other.score > first.score;
