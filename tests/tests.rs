@@ -4,6 +4,7 @@
 
 mod case_study;
 mod cli;
+mod comparing;
 mod controls;
 mod damaged;
 mod declared;

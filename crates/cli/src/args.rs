@@ -164,7 +164,8 @@ pub(crate) struct Drive {
 /// test (eq. 9) and the energy test.
 ///
 /// Each of the arguments is a data set (a folder; every run is a cluster), one run's CSV, or with --sampled a table of
-/// laps that are sampled already.
+/// laps that are sampled already. Clusters are named after data set and run, or after the table; names that repeat give
+/// way to the paths as they were given.
 #[derive(Debug, Args)]
 pub(crate) struct Compare {
     /// Data sets, runs, or gate tables

@@ -131,10 +131,13 @@ pub(crate) fn single(title: &str, description: &str, panel: Panel) -> Figure {
     }
 }
 
-/// The laps of several runs over the walls; a lap's path is its positions at the gates.
-pub(crate) fn laps_map(circuit: &Circuit, runs: &[SampledRun]) -> Figure {
+/// The laps of several runs over the walls, each run under its label; a lap's path is its positions at the gates.
+pub(crate) fn laps_map<'r>(
+    circuit: &Circuit,
+    runs: impl IntoIterator<Item = (String, &'r SampledRun)>,
+) -> Figure {
     let mut marks = vec![walls(&circuit.course)];
-    for (i, run) in runs.iter().enumerate() {
+    for (i, (label, run)) in runs.into_iter().enumerate() {
         let lap = |lap: &track::Lap| {
             let mut points = crossings(circuit, &lap.offsets_m);
             points.extend([points[0], GAP]);
@@ -146,7 +149,7 @@ pub(crate) fn laps_map(circuit: &Circuit, runs: &[SampledRun]) -> Figure {
             opacity: 0.6,
             ..Style::color(palette(i))
         };
-        marks.push(Mark::new(format!("run {}", run.run), style, Shape::Line(points)));
+        marks.push(Mark::new(label, style, Shape::Line(points)));
     }
     single(
         "Laps",

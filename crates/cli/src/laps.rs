@@ -16,8 +16,10 @@ use crate::sightings::{lost, without_strays};
 /// The laps of one run that are analysed, and what was set aside.
 #[derive(Debug, Clone)]
 pub(crate) struct SampledRun {
-    /// `<data set>/<run>`.
+    /// `<data set>/<run>`, or where that does not tell it from others the path it was read from.
     pub(crate) name: String,
+    /// The name of its data set.
+    pub(crate) set: String,
     /// The name of the run alone.
     pub(crate) run: String,
     /// Closed laps, the first whole lap of the run not among them.
@@ -62,6 +64,7 @@ impl SampledRun {
         }
         Self {
             name: format!("{set}/{run}"),
+            set: set.to_owned(),
             run: run.to_owned(),
             laps,
             set_aside,
@@ -85,12 +88,6 @@ impl SampledRun {
             gate,
             time_s: lap.start_s - until_s(gate),
         }
-    }
-
-    /// The name of its data set.
-    pub(crate) fn set(&self) -> &str {
-        let own = self.name.len() - self.run.len();
-        self.name[..own].trim_end_matches('/')
     }
 
     /// Positions at the gates, laps x gates, m.

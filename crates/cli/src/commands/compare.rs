@@ -48,7 +48,12 @@ pub(crate) fn run(session: &Session, args: &Compare) -> Result<()> {
             )?;
         }
         if let Some((circuit, runs)) = &clusters.course {
-            folder.write("laps.svg", figures::laps_map(circuit, runs).to_svg()?)?;
+            let label = |run: &SampledRun| match args.data.as_slice() {
+                [_] => format!("run {}", run.run),
+                _ => run.name.clone(),
+            };
+            let labelled = runs.iter().map(|run| (label(run), run));
+            folder.write("laps.svg", figures::laps_map(circuit, labelled).to_svg()?)?;
         }
         folder.finish(&session.manifest(configuration, clusters.inputs))?;
     }
@@ -93,11 +98,17 @@ fn tables(paths: &[PathBuf]) -> Result<Clusters> {
             tables[0].header.len()
         );
     }
-    let cluster = |table: &GateTable| {
-        Cluster::new(&table.name, &table.rows).with_context(|| table.path.display().to_string())
+    let paths: Vec<String> = paths.iter().map(|path| path.display().to_string()).collect();
+    let names = distinct(tables.iter().map(|table| table.name.clone()).collect(), &paths)?;
+    let cluster = |(name, table): (String, &GateTable)| {
+        Cluster::new(name, &table.rows).with_context(|| table.path.display().to_string())
     };
     Ok(Clusters {
-        list: tables.iter().map(cluster).collect::<Result<_>>()?,
+        list: names
+            .into_iter()
+            .zip(&tables)
+            .map(cluster)
+            .collect::<Result<_>>()?,
         inputs: tables.into_iter().map(|table| table.input).collect(),
         course: None,
     })
@@ -106,7 +117,7 @@ fn tables(paths: &[PathBuf]) -> Result<Clusters> {
 /// Data sets and single runs; each circuit is prepared once.
 fn data_sets(session: &Session, args: &Compare) -> Result<Clusters> {
     let mut circuits: BTreeMap<(String, usize), Arc<Circuit>> = BTreeMap::new();
-    let (mut list, mut inputs, mut runs) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut paths, mut inputs, mut runs) = (Vec::new(), Vec::new(), Vec::new());
     for path in &args.data {
         interrupt::check()?;
         let set = load(path)?;
@@ -122,26 +133,59 @@ fn data_sets(session: &Session, args: &Compare) -> Result<Clusters> {
                 args.data[0].display()
             );
         }
-        let measured = Measured::on(set, Arc::clone(&circuits[&key]), &Config::shipped())?;
-        measured
-            .runs
-            .iter()
-            .flat_map(SampledRun::remarks)
-            .for_each(|remark| session.remark(&remark));
-        list.extend(measured.clusters()?);
-        inputs.extend(measured.set.inputs);
-        runs.extend(measured.runs);
+        let Measured { set, runs: own, .. } =
+            Measured::on(set, Arc::clone(&circuits[&key]), &Config::shipped())?;
+        paths.extend(own.iter().map(|run| match is_one_run(path) {
+            true => path.display().to_string(),
+            false => set.folder.join(&run.run).display().to_string(),
+        }));
+        inputs.extend(set.inputs);
+        runs.extend(own);
     }
+    let names = distinct(runs.iter().map(|run| run.name.clone()).collect(), &paths)?;
+    for (run, name) in runs.iter_mut().zip(names) {
+        run.name = name;
+    }
+    runs.iter()
+        .flat_map(SampledRun::remarks)
+        .for_each(|remark| session.remark(&remark));
+    let list = runs.iter().map(SampledRun::cluster).collect::<Result<_>>()?;
     let course = circuits.into_values().next().map(|circuit| (circuit, runs));
     Ok(Clusters { list, inputs, course })
 }
 
 /// A folder is a data set, a file one run.
 fn load(path: &Path) -> Result<DataSet> {
-    if path.is_file() && !path.ends_with(dataset::DESCRIPTION) {
+    if is_one_run(path) {
         dataset::load_run_csv(path)
     } else {
         DataSet::load(path)
+    }
+}
+
+fn is_one_run(path: &Path) -> bool {
+    path.is_file() && !path.ends_with(dataset::DESCRIPTION)
+}
+
+/// Names that tell clusters apart: those that repeat give way to the paths as they were given.
+///
+/// # Errors
+/// The same path twice.
+fn distinct(mut names: Vec<String>, paths: &[String]) -> Result<Vec<String>> {
+    loop {
+        let repeats = |&i: &usize| names.iter().filter(|name| **name == names[i]).count() > 1;
+        let repeated: Vec<usize> = (0..names.len()).filter(repeats).collect();
+        let Some(&first) = repeated.first() else {
+            return Ok(names);
+        };
+        ensure!(
+            repeated.iter().any(|&i| names[i] != paths[i]),
+            "{} is given twice, and nothing tells the two apart; leave one out",
+            paths[first]
+        );
+        for i in repeated {
+            names[i].clone_from(&paths[i]);
+        }
     }
 }
 
@@ -244,4 +288,19 @@ fn text(document: &Value) -> String {
     }
     text += &table.to_text();
     text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_path_that_is_another_cluster_s_name_makes_that_give_way_too() {
+        let owned = |words: [&str; 3]| words.map(str::to_owned).to_vec();
+        let paths = owned(["x/a", "y/a", "z/a"]);
+        let names = distinct(owned(["n/a", "n/a", "x/a"]), &paths);
+        assert_eq!(names.unwrap(), paths);
+        let names = distinct(owned(["n/a", "n/b", "x/a"]), &paths);
+        assert_eq!(names.unwrap(), ["n/a", "n/b", "x/a"]);
+    }
 }

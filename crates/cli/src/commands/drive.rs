@@ -81,9 +81,10 @@ pub(crate) fn run(session: &Session, args: &args::Drive) -> Result<()> {
         config.world = "world.toml".into();
     }
     out.write("model.toml", config.to_toml())?;
+    let labelled = sampled.iter().map(|run| (format!("run {}", run.run), run));
     out.write(
         "laps.svg",
-        figures::laps_map(setup.scene.circuit(), &sampled).to_svg()?,
+        figures::laps_map(setup.scene.circuit(), labelled).to_svg()?,
     )?;
     let document = summary(&name, &sampled, &driven);
     out.write("summary.json", format!("{document:#}\n"))?;
