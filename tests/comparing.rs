@@ -78,3 +78,80 @@ fn gate_tables_of_one_name_are_told_apart() {
         "g.csv is given twice, and nothing tells the two apart; leave one out",
     );
 }
+
+#[test]
+fn all_modes_are_counted_pair_by_pair() {
+    let scratch = Scratch::new();
+    for (name, seed, laps) in [("a", 1, 4), ("b", 2, 7), ("c", 3, 7)] {
+        scratch.write(&format!("{name}.csv"), table(seed, laps, 30));
+    }
+    let compare = [
+        "compare",
+        "--sampled",
+        "a.csv",
+        "b.csv",
+        "c.csv",
+        "--modes",
+        "all",
+    ];
+    let document = scratch.json(compare.iter().chain(&["--json"]));
+    let pairs = document["pairs"].as_array().unwrap();
+    let modes: Vec<_> = pairs.iter().map(|pair| pair["modes"].as_u64().unwrap()).collect();
+    assert_eq!((&document["modes"], modes), (&17.into(), vec![9, 9, 12]));
+    let said = scratch.done(compare).stdout;
+    assert!(
+        said.contains("distances in all modes (9 to 12 a pair) (eq. 8)"),
+        "{said}"
+    );
+    assert!(said.contains("are not comparable"), "{said}");
+    // Where all are equal, so are their modes.
+    let said = scratch
+        .done(["compare", "--sampled", "b.csv", "c.csv", "--modes", "all"])
+        .stdout;
+    assert!(said.contains("distances in all modes (12 a pair)"), "{said}");
+    assert!(!said.contains("comparable"), "{said}");
+}
+
+#[test]
+fn one_column_has_one_mode() {
+    let scratch = Scratch::new();
+    for (name, seed) in [("a", 1), ("b", 2)] {
+        scratch.write(&format!("{name}.csv"), table(seed, 6, 1));
+    }
+    let ran = scratch.done(["compare", "--sampled", "a.csv", "b.csv", "--out", "o"]);
+    let (laps, title) = ("12 laps in 2 clusters, 1 gate;", "distances in 1 mode (eq. 8)");
+    assert!(
+        ran.stdout.contains(laps) && ran.stdout.contains(title),
+        "{}",
+        ran.stdout
+    );
+    let manifest: Value = serde_json::from_str(&scratch.read("o/manifest.json")).unwrap();
+    assert_eq!(manifest["configuration"]["modes"], "1");
+    scratch.refuses(
+        &["compare", "--sampled", "a.csv", "b.csv", "--modes", "2"],
+        "2 modes wanted, from 1 to 1 are available",
+    );
+}
+
+#[test]
+fn one_cluster_has_nothing_to_be_compared_with() {
+    let scratch = Scratch::new();
+    scratch.write("a.csv", table(1, 6, 3));
+    let ran = scratch.done(["compare", "--sampled", "a.csv"]);
+    assert!(
+        ran.stdout.starts_with("6 laps in 1 cluster, 3 gates;"),
+        "{}",
+        ran.stdout
+    );
+    let end = "\n\nThere is no other cluster to compare it with.\n";
+    assert!(ran.stdout.ends_with(end), "{}", ran.stdout);
+}
+
+#[test]
+fn sampled_laps_need_no_world() {
+    let scratch = Scratch::new();
+    scratch.write("a.csv", table(1, 6, 3));
+    scratch
+        .run(["compare", "--sampled", "a.csv", "--world", "roduit2007"])
+        .is_refused_with("'--sampled' cannot be used with '--world <FILE>'");
+}

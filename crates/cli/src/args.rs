@@ -171,9 +171,10 @@ pub(crate) struct Compare {
     /// Data sets, runs, or gate tables
     #[arg(required = true, value_name = "DATA")]
     pub(crate) data: Vec<PathBuf>,
-    /// Modes of the PDM to compare in: a number, or all
-    #[arg(long, default_value = "2", value_name = "R")]
-    pub(crate) modes: String,
+    /// Modes of the PDM to compare in: a number, or all, which is as many as each pair has laps for [default: 2, or 1 where
+    /// there is no second]
+    #[arg(long, value_name = "R")]
+    pub(crate) modes: Option<String>,
     /// The arguments are CSV files with one row per lap and one numeric column per coordinate
     #[arg(long)]
     pub(crate) sampled: bool,
@@ -181,7 +182,7 @@ pub(crate) struct Compare {
     #[arg(long, default_value_t = 999, value_name = "N")]
     pub(crate) permutations: u32,
     /// World file to use instead of the one that the data sets name
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", conflicts_with = "sampled")]
     pub(crate) world: Option<PathBuf>,
     /// Print one JSON document instead of tables
     #[arg(long)]

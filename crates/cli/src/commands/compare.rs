@@ -22,17 +22,18 @@ use crate::setup;
 use crate::table::{Table, probability};
 
 pub(crate) fn run(session: &Session, args: &Compare) -> Result<()> {
-    let modes = parse_modes(&args.modes)?;
+    let asked = args.modes.as_deref().map(parse_modes).transpose()?;
     let clusters = if args.sampled {
         tables(&args.data)?
     } else {
         data_sets(session, args)?
     };
     let pdm = Pdm::fit(&clusters.list)?;
+    let modes = asked.unwrap_or_else(|| usual_modes(&pdm));
     let document = compare(session, &pdm, &clusters.list, modes, args.permutations)?;
     if let Some(out) = &args.out {
         let configuration =
-            json!({ "data": args.data, "modes": args.modes, "permutations": args.permutations });
+            json!({ "data": args.data, "modes": shown(modes), "permutations": args.permutations });
         let folder = OutDir::create(
             out,
             &Work::new("compare", &configuration),
@@ -60,7 +61,7 @@ pub(crate) fn run(session: &Session, args: &Compare) -> Result<()> {
     if args.json {
         session.print_json(&document)
     } else {
-        session.print(&text(&document))
+        session.print(&text(&document, modes))
     }
 }
 
@@ -79,6 +80,20 @@ fn parse_modes(text: &str) -> Result<Modes> {
     match text.parse() {
         Ok(count) if count > 0 => Ok(Modes::First(count)),
         _ => bail!("--modes {text}: a number of modes from 1, or all, is needed"),
+    }
+}
+
+/// The first two modes, as in the paper's figures, as far as they are there.
+fn usual_modes(pdm: &Pdm) -> Modes {
+    const USUAL: usize = 2;
+    Modes::First(USUAL.min(pdm.degrees_of_freedom()))
+}
+
+/// As on the command line.
+fn shown(modes: Modes) -> String {
+    match modes {
+        Modes::First(count) => count.to_string(),
+        Modes::All => "all".into(),
     }
 }
 
@@ -209,7 +224,7 @@ fn compare(
             interrupt::check()?;
             let t = pdm::hotelling(a, b)?;
             let mut pair = json!({
-                "a": a.name(), "b": b.name(), "distance": t.distance, "t2": t.t2,
+                "a": a.name(), "b": b.name(), "modes": t.df1, "distance": t.distance, "t2": t.t2,
                 "f": t.f, "df1": t.df1, "df2": t.df2, "p": t.p,
             });
             if permutations > 0 {
@@ -248,32 +263,35 @@ fn pairs_csv(document: &Value) -> String {
     csv
 }
 
-fn text(document: &Value) -> String {
-    let explained: Vec<String> = document["explained"]
-        .as_array()
-        .into_iter()
-        .flatten()
+fn text(document: &Value, modes: Modes) -> String {
+    let list = |key: &str| document[key].as_array().map_or(&[][..], Vec::as_slice);
+    let explained: Vec<String> = list("explained")
+        .iter()
         .take(5)
         .map(|share| format!("{:.1} %", 100.0 * share.as_f64().unwrap_or(0.0)))
         .collect();
+    let laps = list("clusters").iter().filter_map(|c| c["laps"].as_u64()).sum();
+    let clusters = list("clusters").len() as u64;
     let mut text = format!(
-        "{} laps in {} clusters, {} gates; variance in the first modes: {}\n\n",
-        document["clusters"]
-            .as_array()
-            .into_iter()
-            .flatten()
-            .filter_map(|c| c["laps"].as_u64())
-            .sum::<u64>(),
-        document["clusters"].as_array().map_or(0, Vec::len),
-        document["gates"],
+        "{} in {}, {}; variance in the first modes: {}\n\n",
+        counted(laps, "lap"),
+        counted(clusters, "cluster"),
+        counted(document["gates"].as_u64().unwrap_or(0), "gate"),
         explained.join(", "),
     );
-    let title = format!(
-        "Inter-cluster distances in {} modes (eq. 8), Hotelling's and the energy test",
-        document["modes"]
-    );
+    if clusters == 1 {
+        return text + "There is no other cluster to compare it with.\n";
+    }
+    let used = list("pairs").iter().filter_map(|pair| pair["modes"].as_u64());
+    let [fewest, most] = [used.clone().min().unwrap_or(0), used.max().unwrap_or(0)];
+    let modes = match modes {
+        Modes::First(_) => counted(most, "mode"),
+        Modes::All if fewest == most => format!("all modes ({most} a pair)"),
+        Modes::All => format!("all modes ({fewest} to {most} a pair)"),
+    };
+    let title = format!("Inter-cluster distances in {modes} (eq. 8), Hotelling's and the energy test");
     let mut table = Table::new(title, &["a", "b", "distance", "T2", "F", "df", "p", "energy p"]);
-    for pair in document["pairs"].as_array().into_iter().flatten() {
+    for pair in list("pairs") {
         let number = |key: &str| pair[key].as_f64().unwrap_or(f64::NAN);
         table.push([
             pair["a"].as_str().unwrap_or("").to_owned(),
@@ -287,7 +305,18 @@ fn text(document: &Value) -> String {
         ]);
     }
     text += &table.to_text();
+    if fewest < most {
+        text += "\nDistances in different numbers of modes (the first number of df) are not comparable.\n";
+    }
     text
+}
+
+/// So many of them, in words.
+fn counted(count: u64, what: &str) -> String {
+    match count {
+        1 => format!("1 {what}"),
+        _ => format!("{count} {what}s"),
+    }
 }
 
 #[cfg(test)]
