@@ -80,6 +80,27 @@ fn gate_tables_of_one_name_are_told_apart() {
 }
 
 #[test]
+fn pairs_are_csv_whatever_clusters_are_called() {
+    let scratch = Scratch::new();
+    let odd = "a \"set\", on\ntwo lines";
+    drive(&scratch, "set", &["--name", "set", "--runs", "2"]);
+    let description = scratch.read("set/dataset.toml");
+    let odd_name = format!("name = {}", Value::from(odd));
+    scratch.write(
+        "set/dataset.toml",
+        description.replace("name = \"set\"", &odd_name),
+    );
+    scratch.done(["compare", "set", "--out", "o"]);
+    let pairs = scratch.read("o/pairs.csv");
+    let mut pairs = csv::Reader::from_reader(pairs.as_bytes());
+    assert_eq!(&pairs.headers().unwrap()[8], "energy_p");
+    let rows: Vec<csv::StringRecord> = pairs.records().map(Result::unwrap).collect();
+    assert_eq!(rows.len(), 1);
+    let names = [&rows[0][0], &rows[0][1]];
+    assert_eq!(names, ["a", "b"].map(|run| format!("{odd}/{run}")));
+}
+
+#[test]
 fn all_modes_are_counted_pair_by_pair() {
     let scratch = Scratch::new();
     for (name, seed, laps) in [("a", 1, 4), ("b", 2, 7), ("c", 3, 7)] {

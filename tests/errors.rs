@@ -701,6 +701,22 @@ fn a_file_that_may_not_grow() {
     }
 }
 
+#[test]
+fn names_that_no_table_could_show() {
+    let scratch = Scratch::new();
+    for (name, shown) in [
+        ("", "\"\""),
+        (" ", "\" \""),
+        ("a\nb", "\"a\\nb\""),
+        ("\u{1b}[2J", "\"\\u{1b}[2J\""),
+    ] {
+        scratch.refuses(
+            &["drive", "roduit2007", "--name", name, "--out", "o"],
+            &format!("--name {shown}: a name on one line is needed, of more than spaces and without control characters"),
+        );
+    }
+}
+
 /// Ctrl-C on a command that cannot resume.
 #[cfg(unix)]
 #[test]

@@ -41,7 +41,7 @@ pub(crate) fn run(session: &Session, args: &Compare) -> Result<()> {
             false,
         )?;
         folder.write("compare.json", format!("{document:#}\n"))?;
-        folder.write("pairs.csv", pairs_csv(&document))?;
+        folder.write("pairs.csv", pairs_csv(&document)?)?;
         if pdm.degrees_of_freedom() >= 2 {
             folder.write(
                 "modes.svg",
@@ -250,17 +250,18 @@ fn test(result: &TestResult) -> Value {
     json!({ "statistic": result.statistic, "p": result.p, "method": result.method })
 }
 
-fn pairs_csv(document: &Value) -> String {
-    let mut csv = String::from("a,b,distance,t2,f,df1,df2,p,energy_p\n");
+fn pairs_csv(document: &Value) -> Result<Vec<u8>> {
+    let mut csv = csv::Writer::from_writer(Vec::new());
+    csv.write_record(["a", "b", "distance", "t2", "f", "df1", "df2", "p", "energy_p"])?;
     for pair in document["pairs"].as_array().into_iter().flatten() {
         let names = ["a", "b"].map(|key| pair[key].as_str().unwrap_or("").to_owned());
         let numbers = ["distance", "t2", "f", "df1", "df2", "p"].map(|key| pair[key].to_string());
         let energy = pair["energy"]["p"]
             .as_f64()
             .map_or(String::new(), |p| p.to_string());
-        csv += &format!("{},{},{energy}\n", names.join(","), numbers.join(","));
+        csv.write_record(names.into_iter().chain(numbers).chain([energy]))?;
     }
-    csv
+    csv.into_inner().context("cannot write to memory")
 }
 
 fn text(document: &Value, modes: Modes) -> String {

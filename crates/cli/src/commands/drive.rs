@@ -1,6 +1,6 @@
 //! `lapwing drive`: simulated laps as a data set.
 
-use anyhow::Result;
+use anyhow::{Result, ensure};
 use rayon::prelude::*;
 use serde_json::{Value, json};
 use sim::{CasterKind, Drive, Model, Pattern, Step, Streams};
@@ -18,6 +18,9 @@ use crate::setup::{self, Setup, locate};
 use crate::table::Table;
 
 pub(crate) fn run(session: &Session, args: &args::Drive) -> Result<()> {
+    if let Some(name) = &args.name {
+        check_name(name)?;
+    }
     let file = setup::model_file(&args.model)?;
     let world = args.model.settings.world.as_deref();
     let kind = args.caster.as_deref().and_then(caster);
@@ -98,6 +101,15 @@ pub(crate) fn run(session: &Session, args: &args::Drive) -> Result<()> {
     } else {
         session.print(&text(args, &document))
     }
+}
+
+/// Whether tables and files can call a data set so.
+fn check_name(name: &str) -> Result<()> {
+    ensure!(
+        !name.trim().is_empty() && !name.contains(char::is_control),
+        "--name {name:?}: a name on one line is needed, of more than spaces and without control characters"
+    );
+    Ok(())
 }
 
 /// Runs where nobody says how many: those that the model's effects have values for.
