@@ -176,3 +176,17 @@ fn sampled_laps_need_no_world() {
         .run(["compare", "--sampled", "a.csv", "--world", "roduit2007"])
         .is_refused_with("'--sampled' cannot be used with '--world <FILE>'");
 }
+
+#[test]
+fn sampled_laps_have_no_unit() {
+    let scratch = Scratch::new();
+    scratch.write("a.csv", table(1, 6, 3));
+    scratch.done(["compare", "--sampled", "a.csv", "--out", "o"]);
+    let modes = scratch.read("o/modes.svg");
+    assert!(modes.contains(">mode 1 (") && !modes.contains("mm"), "{modes}");
+    // Numbers up to 1, as they stand in the table.
+    assert!(modes.contains(">0.5<") && !modes.contains(">500<"), "{modes}");
+    drive(&scratch, "set", &["--runs", "1"]);
+    scratch.done(["compare", "set", "--out", "o"]);
+    assert!(scratch.read("o/modes.svg").contains(">mode 1, mm ("));
+}

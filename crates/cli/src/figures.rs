@@ -14,6 +14,28 @@ use crate::laps::SampledRun;
 /// Millimetres in a metre.
 pub(crate) const MM: f64 = 1000.0;
 
+/// How a drawing of the modes shows lengths.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Scale {
+    /// What one becomes.
+    factor: f64,
+    /// The unit as it stands behind the name of an axis.
+    unit: &'static str,
+}
+
+impl Scale {
+    /// Metres in mm.
+    pub(crate) const MM: Self = Self {
+        factor: MM,
+        unit: ", mm",
+    };
+    /// Numbers of a unit that nobody said, as they are.
+    pub(crate) const PLAIN: Self = Self {
+        factor: 1.0,
+        unit: "",
+    };
+}
+
 /// The outlines of both walls.
 pub(crate) fn walls(course: &Course) -> Mark {
     let outline = |wall: &Wall| {
@@ -159,16 +181,21 @@ pub(crate) fn laps_map<'r>(
 }
 
 /// A cluster in the plane of the first two modes: its laps and the ellipse of two standard deviations.
-pub(crate) fn cluster_marks(projection: &Projection, label: &str, style: Style) -> Vec<Mark> {
+pub(crate) fn cluster_marks(
+    projection: &Projection,
+    label: &str,
+    style: Style,
+    Scale { factor, .. }: Scale,
+) -> Vec<Mark> {
     let points = projection.points();
     let laps = (0..points.nrows())
-        .map(|k| [MM * points[(k, 0)], MM * points[(k, 1)]])
+        .map(|k| [factor * points[(k, 0)], factor * points[(k, 1)]])
         .collect();
     let mut marks = vec![Mark::new(label, style, Shape::Points(laps))];
     if let Ok(ellipse) = covariance_ellipse(projection, 2.0) {
         let shape = Shape::Ellipses(vec![Ellipse {
-            center: ellipse.centre.map(|c| MM * c),
-            semi_axes: ellipse.semi_axes.map(|a| MM * a),
+            center: ellipse.centre.map(|c| factor * c),
+            semi_axes: ellipse.semi_axes.map(|a| factor * a),
             angle_rad: ellipse.angle_rad,
         }]);
         marks.push(Mark::new(
@@ -186,10 +213,10 @@ pub(crate) fn cluster_marks(projection: &Projection, label: &str, style: Style) 
 }
 
 /// The axes of the plane of the first two modes.
-pub(crate) fn modes_panel(title: &str, pdm: &Pdm, marks: Vec<Mark>) -> Panel {
+pub(crate) fn modes_panel(title: &str, pdm: &Pdm, marks: Vec<Mark>, Scale { unit, .. }: Scale) -> Panel {
     let axis = |mode: usize| {
         let share = 100.0 * pdm.explained().get(mode).copied().unwrap_or(0.0);
-        Axis::linear(format!("mode {}, mm ({share:.0} % of the variance)", mode + 1))
+        Axis::linear(format!("mode {}{unit} ({share:.0} % of the variance)", mode + 1))
     };
     Panel {
         title: title.into(),
@@ -202,16 +229,21 @@ pub(crate) fn modes_panel(title: &str, pdm: &Pdm, marks: Vec<Mark>) -> Panel {
 }
 
 /// All clusters of a PDM in the plane of its first two modes.
-pub(crate) fn modes_figure(pdm: &Pdm, clusters: &[pdm::Cluster]) -> Result<Figure> {
+pub(crate) fn modes_figure(pdm: &Pdm, clusters: &[pdm::Cluster], scale: Scale) -> Result<Figure> {
     let mut marks = Vec::new();
     for (i, cluster) in clusters.iter().enumerate() {
         let projection = pdm.project(cluster, Modes::First(2))?;
-        marks.extend(cluster_marks(&projection, cluster.name(), Style::series(i)));
+        marks.extend(cluster_marks(
+            &projection,
+            cluster.name(),
+            Style::series(i),
+            scale,
+        ));
     }
     Ok(single(
         "Point Distribution Model",
         "Every lap in the plane of the first two modes, with an ellipse of two standard deviations round each cluster.",
-        modes_panel("", pdm, marks),
+        modes_panel("", pdm, marks, scale),
     ))
 }
 
@@ -268,10 +300,10 @@ pub(crate) struct Shown<'a> {
 pub(crate) fn plane(title: &str, pdm: &Pdm, clusters: &[Shown<'_>]) -> Panel {
     let marks = clusters
         .iter()
-        .flat_map(|shown| cluster_marks(shown.projection, &shown.label, shown.style));
+        .flat_map(|shown| cluster_marks(shown.projection, &shown.label, shown.style, Scale::MM));
     Panel {
         size_px: [380.0, 300.0],
-        ..modes_panel(title, pdm, marks.collect())
+        ..modes_panel(title, pdm, marks.collect(), Scale::MM)
     }
 }
 

@@ -12,7 +12,7 @@ use std::sync::Arc;
 use crate::args::Compare;
 use crate::config::Config;
 use crate::dataset::{self, DataSet};
-use crate::figures;
+use crate::figures::{self, Scale};
 use crate::gate_table::GateTable;
 use crate::interrupt;
 use crate::laps::{Measured, SampledRun};
@@ -43,9 +43,10 @@ pub(crate) fn run(session: &Session, args: &Compare) -> Result<()> {
         folder.write("compare.json", format!("{document:#}\n"))?;
         folder.write("pairs.csv", pairs_csv(&document)?)?;
         if pdm.degrees_of_freedom() >= 2 {
+            let scale = if args.sampled { Scale::PLAIN } else { Scale::MM };
             folder.write(
                 "modes.svg",
-                figures::modes_figure(&pdm, &clusters.list)?.to_svg()?,
+                figures::modes_figure(&pdm, &clusters.list, scale)?.to_svg()?,
             )?;
         }
         if let Some((circuit, runs)) = &clusters.course {
