@@ -190,3 +190,50 @@ fn sampled_laps_have_no_unit() {
     scratch.done(["compare", "set", "--out", "o"]);
     assert!(scratch.read("o/modes.svg").contains(">mode 1, mm ("));
 }
+
+#[test]
+fn laps_that_were_written_are_compared_to_the_same_distances() {
+    let scratch = Scratch::new();
+    drive(&scratch, "set", &["--name", "set", "--runs", "3"]);
+    let whole = scratch.json(["compare", "set", "--out", "o", "--json"]);
+    let tables = ["a", "b", "c"].map(|run| format!("o/laps/set_{run}.csv"));
+    let args = ["compare", "--sampled", "--json"].map(str::to_owned);
+    let again = scratch.json(args.iter().chain(&tables));
+    let numbers = |document: &Value| {
+        let mut pairs = document["pairs"].as_array().unwrap().clone();
+        for pair in &mut pairs {
+            let pair = pair.as_object_mut().unwrap();
+            pair.retain(|key, _| key != "a" && key != "b");
+        }
+        pairs
+    };
+    assert_eq!(numbers(&again), numbers(&whole));
+    assert_eq!(again["eigenvalues"], whole["eigenvalues"]);
+    let header = scratch.read(&tables[0]).lines().next().unwrap().to_owned();
+    assert!(
+        header.starts_with("gate_0,gate_1,") && header.ends_with(",gate_99"),
+        "{header}"
+    );
+
+    let scores = scratch.read("o/projections.csv");
+    let mut scores = csv::Reader::from_reader(scores.as_bytes());
+    assert_eq!(
+        scores.headers().unwrap(),
+        vec!["cluster", "lap", "mode_1", "mode_2"]
+    );
+    let rows: Vec<csv::StringRecord> = scores.records().map(Result::unwrap).collect();
+    assert_eq!((rows.len(), &rows[5][0], &rows[5][1]), (12, "set/b", "2"));
+    // All laps together have the variance of the mode.
+    let squares = rows.iter().map(|row| row[2].parse::<f64>().unwrap().powi(2));
+    let (is, should) = (
+        squares.sum::<f64>() / 11.0,
+        whole["eigenvalues"][0].as_f64().unwrap(),
+    );
+    assert!((is - should).abs() < 1e-9 * should, "{is} should be {should}");
+
+    let manifest: Value = serde_json::from_str(&scratch.read("o/manifest.json")).unwrap();
+    let files = manifest["files"].as_array().unwrap();
+    assert!(files.contains(&"projections.csv".into()) && files.contains(&"laps/set_c.csv".into()));
+    // What is ours is replaced, tables too.
+    scratch.done(["compare", "set", "--out", "o"]);
+}

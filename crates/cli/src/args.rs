@@ -187,7 +187,8 @@ pub(crate) struct Compare {
     /// Print one JSON document instead of tables
     #[arg(long)]
     pub(crate) json: bool,
-    /// Folder for tables and pictures, in place of an earlier result there
+    /// Folder for tables, pictures, the laps as gate tables and their places in the modes, in place of an earlier result
+    /// there
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
 }

@@ -1,36 +1,35 @@
 //! `lapwing compare`: one Point Distribution Model of all clusters, and every pair in it.
 
-use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+mod clusters;
 
-use anyhow::{Context, Result, bail, ensure};
-use pdm::{Cluster, Modes, Pdm, TestResult};
+use anyhow::{Context, Result, bail};
+use pdm::{Cluster, Modes, Pdm, Projection, TestResult};
 use serde_json::{Value, json};
-use sim::Circuit;
-use std::sync::Arc;
 
 use crate::args::Compare;
-use crate::config::Config;
-use crate::dataset::{self, DataSet};
 use crate::figures::{self, Scale};
-use crate::gate_table::GateTable;
+use crate::gate_table;
 use crate::interrupt;
-use crate::laps::{Measured, SampledRun};
-use crate::output::{Input, OutDir, Work};
+use crate::laps::SampledRun;
+use crate::output::{OutDir, Work};
 use crate::session::Session;
-use crate::setup;
 use crate::table::{Table, probability};
 
 pub(crate) fn run(session: &Session, args: &Compare) -> Result<()> {
     let asked = args.modes.as_deref().map(parse_modes).transpose()?;
     let clusters = if args.sampled {
-        tables(&args.data)?
+        clusters::tables(&args.data)?
     } else {
-        data_sets(session, args)?
+        clusters::data_sets(session, args)?
     };
     let pdm = Pdm::fit(&clusters.list)?;
     let modes = asked.unwrap_or_else(|| usual_modes(&pdm));
-    let document = compare(session, &pdm, &clusters.list, modes, args.permutations)?;
+    let projections: Vec<Projection> = clusters
+        .list
+        .iter()
+        .map(|cluster| pdm.project(cluster, modes))
+        .collect::<Result<_, _>>()?;
+    let document = compare(session, &pdm, &clusters.list, &projections, args.permutations)?;
     if let Some(out) = &args.out {
         let configuration =
             json!({ "data": args.data, "modes": shown(modes), "permutations": args.permutations });
@@ -42,6 +41,7 @@ pub(crate) fn run(session: &Session, args: &Compare) -> Result<()> {
         )?;
         folder.write("compare.json", format!("{document:#}\n"))?;
         folder.write("pairs.csv", pairs_csv(&document)?)?;
+        folder.write("projections.csv", projections_csv(&projections)?)?;
         if pdm.degrees_of_freedom() >= 2 {
             let scale = if args.sampled { Scale::PLAIN } else { Scale::MM };
             folder.write(
@@ -56,6 +56,9 @@ pub(crate) fn run(session: &Session, args: &Compare) -> Result<()> {
             };
             let labelled = runs.iter().map(|run| (label(run), run));
             folder.write("laps.svg", figures::laps_map(circuit, labelled).to_svg()?)?;
+            for (name, cluster) in gate_table::file_names(&clusters.list).iter().zip(&clusters.list) {
+                folder.write(&format!("laps/{name}.csv"), gate_table::to_csv(cluster))?;
+            }
         }
         folder.finish(&session.manifest(configuration, clusters.inputs))?;
     }
@@ -64,14 +67,6 @@ pub(crate) fn run(session: &Session, args: &Compare) -> Result<()> {
     } else {
         session.print(&text(&document, modes))
     }
-}
-
-/// What is compared, and where it came from.
-struct Clusters {
-    list: Vec<Cluster>,
-    inputs: Vec<Input>,
-    /// The circuit and the laps on it, where there is one.
-    course: Option<(Arc<Circuit>, Vec<SampledRun>)>,
 }
 
 fn parse_modes(text: &str) -> Result<Modes> {
@@ -98,124 +93,13 @@ fn shown(modes: Modes) -> String {
     }
 }
 
-/// Gate tables.
-fn tables(paths: &[PathBuf]) -> Result<Clusters> {
-    let tables: Vec<GateTable> = paths
-        .iter()
-        .map(|path| GateTable::load(path))
-        .collect::<Result<_>>()?;
-    for table in &tables[1..] {
-        ensure!(
-            table.header.len() == tables[0].header.len(),
-            "{} has {} columns and {} has {}: laps are compared coordinate by coordinate",
-            table.path.display(),
-            table.header.len(),
-            tables[0].path.display(),
-            tables[0].header.len()
-        );
-    }
-    let paths: Vec<String> = paths.iter().map(|path| path.display().to_string()).collect();
-    let names = distinct(tables.iter().map(|table| table.name.clone()).collect(), &paths)?;
-    let cluster = |(name, table): (String, &GateTable)| {
-        Cluster::new(name, &table.rows).with_context(|| table.path.display().to_string())
-    };
-    Ok(Clusters {
-        list: names
-            .into_iter()
-            .zip(&tables)
-            .map(cluster)
-            .collect::<Result<_>>()?,
-        inputs: tables.into_iter().map(|table| table.input).collect(),
-        course: None,
-    })
-}
-
-/// Data sets and single runs; each circuit is prepared once.
-fn data_sets(session: &Session, args: &Compare) -> Result<Clusters> {
-    let mut circuits: BTreeMap<(String, usize), Arc<Circuit>> = BTreeMap::new();
-    let (mut paths, mut inputs, mut runs) = (Vec::new(), Vec::new(), Vec::new());
-    for path in &args.data {
-        interrupt::check()?;
-        let set = load(path)?;
-        let source = set.world_source(args.world.as_deref())?;
-        let gates = set.declared_config(&Config::shipped())?.run.gates;
-        let key = (source.text.clone(), gates);
-        if !circuits.contains_key(&key) {
-            circuits.insert(key.clone(), setup::circuit(&source, gates)?);
-            ensure!(
-                circuits.len() == 1,
-                "{}: its world or its gates differ from those of {}: laps are compared gate by gate",
-                path.display(),
-                args.data[0].display()
-            );
-        }
-        let Measured { set, runs: own, .. } =
-            Measured::on(set, Arc::clone(&circuits[&key]), &Config::shipped())?;
-        paths.extend(own.iter().map(|run| match is_one_run(path) {
-            true => path.display().to_string(),
-            false => set.folder.join(&run.run).display().to_string(),
-        }));
-        inputs.extend(set.inputs);
-        runs.extend(own);
-    }
-    let names = distinct(runs.iter().map(|run| run.name.clone()).collect(), &paths)?;
-    for (run, name) in runs.iter_mut().zip(names) {
-        run.name = name;
-    }
-    runs.iter()
-        .flat_map(SampledRun::remarks)
-        .for_each(|remark| session.remark(&remark));
-    let list = runs.iter().map(SampledRun::cluster).collect::<Result<_>>()?;
-    let course = circuits.into_values().next().map(|circuit| (circuit, runs));
-    Ok(Clusters { list, inputs, course })
-}
-
-/// A folder is a data set, a file one run.
-fn load(path: &Path) -> Result<DataSet> {
-    if is_one_run(path) {
-        dataset::load_run_csv(path)
-    } else {
-        DataSet::load(path)
-    }
-}
-
-fn is_one_run(path: &Path) -> bool {
-    path.is_file() && !path.ends_with(dataset::DESCRIPTION)
-}
-
-/// Names that tell clusters apart: those that repeat give way to the paths as they were given.
-///
-/// # Errors
-/// The same path twice.
-fn distinct(mut names: Vec<String>, paths: &[String]) -> Result<Vec<String>> {
-    loop {
-        let repeats = |&i: &usize| names.iter().filter(|name| **name == names[i]).count() > 1;
-        let repeated: Vec<usize> = (0..names.len()).filter(repeats).collect();
-        let Some(&first) = repeated.first() else {
-            return Ok(names);
-        };
-        ensure!(
-            repeated.iter().any(|&i| names[i] != paths[i]),
-            "{} is given twice, and nothing tells the two apart; leave one out",
-            paths[first]
-        );
-        for i in repeated {
-            names[i].clone_from(&paths[i]);
-        }
-    }
-}
-
 fn compare(
     session: &Session,
     pdm: &Pdm,
     clusters: &[Cluster],
-    modes: Modes,
+    projections: &[Projection],
     permutations: u32,
 ) -> Result<Value> {
-    let projections: Vec<pdm::Projection> = clusters
-        .iter()
-        .map(|cluster| pdm.project(cluster, modes))
-        .collect::<Result<_, _>>()?;
     let used = projections.first().map_or(0, |p| p.points().ncols());
     let pair_count = clusters.len() * clusters.len().saturating_sub(1) / 2;
     let progress = session.progress("comparing", pair_count as u64);
@@ -261,6 +145,21 @@ fn pairs_csv(document: &Value) -> Result<Vec<u8>> {
             .as_f64()
             .map_or(String::new(), |p| p.to_string());
         csv.write_record(names.into_iter().chain(numbers).chain([energy]))?;
+    }
+    csv.into_inner().context("cannot write to memory")
+}
+
+/// Where the laps are in the modes that are compared; laps count from 1, as the rows of the gate tables do.
+fn projections_csv(projections: &[Projection]) -> Result<Vec<u8>> {
+    let mut csv = csv::Writer::from_writer(Vec::new());
+    let modes = projections.first().map_or(0, |p| p.points().ncols());
+    let own = ["cluster", "lap"].map(str::to_owned);
+    csv.write_record(own.into_iter().chain((1..=modes).map(|r| format!("mode_{r}"))))?;
+    for projection in projections {
+        for (lap, point) in (1..).zip(projection.points().row_iter()) {
+            let own: [String; 2] = [projection.name().to_owned(), format!("{lap}")];
+            csv.write_record(own.into_iter().chain(point.iter().map(f64::to_string)))?;
+        }
     }
     csv.into_inner().context("cannot write to memory")
 }
@@ -318,20 +217,5 @@ fn counted(count: u64, what: &str) -> String {
     match count {
         1 => format!("1 {what}"),
         _ => format!("{count} {what}s"),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_path_that_is_another_cluster_s_name_makes_that_give_way_too() {
-        let owned = |words: [&str; 3]| words.map(str::to_owned).to_vec();
-        let paths = owned(["x/a", "y/a", "z/a"]);
-        let names = distinct(owned(["n/a", "n/a", "x/a"]), &paths);
-        assert_eq!(names.unwrap(), paths);
-        let names = distinct(owned(["n/a", "n/b", "x/a"]), &paths);
-        assert_eq!(names.unwrap(), ["n/a", "n/b", "x/a"]);
     }
 }
