@@ -9,6 +9,7 @@ mod controls;
 mod damaged;
 mod declared;
 mod determinism;
+mod driving;
 mod effects_in_logs;
 mod errors;
 #[path = "../benches/ground/mod.rs"]

@@ -256,5 +256,10 @@ fn text(args: &args::Drive, document: &Value) -> String {
             },
         ]);
     }
-    format!("{}\nwritten to {}\n", table.to_text(), args.out.display())
+    format!(
+        "{}\nwritten to {}, as {}\n",
+        table.to_text(),
+        args.out.display(),
+        document["data_set"].as_str().unwrap_or("")
+    )
 }
