@@ -7,9 +7,7 @@ use chart::{
 };
 use pdm::{Modes, Pdm, Projection, covariance_ellipse};
 use sim::Circuit;
-use track::{Course, Wall};
-
-use crate::laps::SampledRun;
+use track::{Course, Lap, Wall};
 
 /// Millimetres in a metre.
 pub(crate) const MM: f64 = 1000.0;
@@ -153,31 +151,68 @@ pub(crate) fn single(title: &str, description: &str, panel: Panel) -> Figure {
     }
 }
 
-/// The laps of several runs over the walls, each run under its label; a lap's path is its positions at the gates.
-pub(crate) fn laps_map<'r>(
-    circuit: &Circuit,
-    runs: impl IntoIterator<Item = (String, &'r SampledRun)>,
-) -> Figure {
-    let mut marks = vec![walls(&circuit.course)];
-    for (i, (label, run)) in runs.into_iter().enumerate() {
-        let lap = |lap: &track::Lap| {
+/// A run as it stands on a map.
+#[derive(Debug, Clone)]
+pub(crate) struct DrawnRun<'r> {
+    pub(crate) label: String,
+    pub(crate) laps: &'r [Lap],
+    /// What was driven after the last lap kept up to where the robot stopped, m; empty where that is not shown.
+    pub(crate) rest: Vec<[f64; 2]>,
+}
+
+impl DrawnRun<'_> {
+    fn marks(&self, circuit: &Circuit, color: Color) -> Vec<Mark> {
+        let lap = |lap: &Lap| {
             let mut points = crossings(circuit, &lap.offsets_m);
             points.extend([points[0], GAP]);
             points
         };
-        let points: Vec<[f64; 2]> = run.laps.iter().flat_map(lap).collect();
+        let points: Vec<[f64; 2]> = self.laps.iter().flat_map(lap).collect();
         let style = Style {
             width_px: 0.7,
             opacity: 0.6,
-            ..Style::color(palette(i))
+            ..Style::color(color)
         };
-        marks.push(Mark::new(label, style, Shape::Line(points)));
+        let mut marks = Vec::new();
+        if !points.is_empty() {
+            marks.push(Mark::new(&self.label, style, Shape::Line(points)));
+        }
+        if let Some(&end) = self.rest.last() {
+            let way = if self.laps.is_empty() {
+                "no lap kept:"
+            } else {
+                "on"
+            };
+            let label = format!("{}, {way} to where it stopped", self.label);
+            let stop = Style {
+                marker: Marker::Cross,
+                size_px: 10.0,
+                width_px: 2.0,
+                ..Style::color(color)
+            };
+            marks.push(Mark::new(
+                &label,
+                line(color, Dash::Dashed, 1.0),
+                Shape::Line(self.rest.clone()),
+            ));
+            marks.push(Mark::new(&label, stop, Shape::Points(vec![end])));
+        }
+        marks
     }
-    single(
-        "Laps",
-        "Every lap kept, drawn through its positions at the gates.",
-        map("", marks),
-    )
+}
+
+/// The laps of several runs over the walls; a lap's path is its positions at the gates.
+pub(crate) fn laps_map(circuit: &Circuit, runs: &[DrawnRun<'_>]) -> Figure {
+    let mut marks = vec![walls(&circuit.course)];
+    for (i, run) in runs.iter().enumerate() {
+        marks.extend(run.marks(circuit, palette(i)));
+    }
+    let mut description = String::from("Every lap kept, drawn through its positions at the gates.");
+    if runs.iter().any(|run| !run.rest.is_empty()) {
+        description +=
+            " Dashed what was driven after the last of them, with a cross where the robot stopped.";
+    }
+    single("Laps", &description, map("", marks))
 }
 
 /// A cluster in the plane of the first two modes: its laps and the ellipse of two standard deviations.

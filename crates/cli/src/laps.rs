@@ -241,12 +241,16 @@ pub(crate) fn simulated(name: &str, run: usize, drive: &Drive, wanted: usize) ->
     }
 }
 
-/// Mean and standard deviation (divisor n - 1).
+/// Mean and standard deviation (divisor n - 1); NaN where there are too few for it.
 pub(crate) fn mean_and_deviation(values: &[f64]) -> (f64, f64) {
     let n = values.len() as f64;
     let mean = values.iter().sum::<f64>() / n;
     let squares: f64 = values.iter().map(|v| (v - mean) * (v - mean)).sum();
-    (mean, (squares / (n - 1.0)).sqrt())
+    let deviation = match values {
+        [] | [_] => f64::NAN,
+        _ => (squares / (n - 1.0)).sqrt(),
+    };
+    (mean, deviation)
 }
 
 #[cfg(test)]
@@ -267,6 +271,15 @@ mod tests {
         };
         let whole: Vec<Lap> = (0..4).map(lap).collect();
         SampledRun::new("set", "a", &whole, 3, |_| None)
+    }
+
+    #[test]
+    fn one_value_has_no_deviation_and_none_has_no_mean() {
+        let (mean, deviation) = mean_and_deviation(&[]);
+        assert!(mean.is_nan() && deviation.is_nan(), "{mean} {deviation}");
+        let (mean, deviation) = mean_and_deviation(&[3.0]);
+        assert!(mean == 3.0 && deviation.is_nan(), "{mean} {deviation}");
+        assert_eq!(mean_and_deviation(&[1.0, 3.0]), (2.0, 2.0_f64.sqrt()));
     }
 
     #[test]

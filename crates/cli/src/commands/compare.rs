@@ -7,13 +7,13 @@ use pdm::{Cluster, Modes, Pdm, Projection, TestResult};
 use serde_json::{Value, json};
 
 use crate::args::Compare;
-use crate::figures::{self, Scale};
+use crate::figures::{self, DrawnRun, Scale};
 use crate::gate_table;
 use crate::interrupt;
 use crate::laps::SampledRun;
 use crate::output::{OutDir, Work};
 use crate::session::Session;
-use crate::table::{Table, probability};
+use crate::table::{Table, counted, probability};
 
 pub(crate) fn run(session: &Session, args: &Compare) -> Result<()> {
     let asked = args.modes.as_deref().map(parse_modes).transpose()?;
@@ -54,8 +54,13 @@ pub(crate) fn run(session: &Session, args: &Compare) -> Result<()> {
                 [_] => format!("run {}", run.run),
                 _ => run.name.clone(),
             };
-            let labelled = runs.iter().map(|run| (label(run), run));
-            folder.write("laps.svg", figures::laps_map(circuit, labelled).to_svg()?)?;
+            let drawn = |run| DrawnRun {
+                label: label(run),
+                laps: &run.laps,
+                rest: Vec::new(),
+            };
+            let drawn: Vec<DrawnRun<'_>> = runs.iter().map(drawn).collect();
+            folder.write("laps.svg", figures::laps_map(circuit, &drawn).to_svg()?)?;
             for (name, cluster) in gate_table::file_names(&clusters.list).iter().zip(&clusters.list) {
                 folder.write(&format!("laps/{name}.csv"), gate_table::to_csv(cluster))?;
             }
@@ -171,19 +176,20 @@ fn text(document: &Value, modes: Modes) -> String {
         .take(5)
         .map(|share| format!("{:.1} %", 100.0 * share.as_f64().unwrap_or(0.0)))
         .collect();
-    let laps = list("clusters").iter().filter_map(|c| c["laps"].as_u64()).sum();
-    let clusters = list("clusters").len() as u64;
+    let number = |value: &Value| value.as_u64().unwrap_or(0) as usize;
+    let laps = list("clusters").iter().map(|c| number(&c["laps"])).sum();
+    let clusters = list("clusters").len();
     let mut text = format!(
         "{} in {}, {}; variance in the first modes: {}\n\n",
         counted(laps, "lap"),
         counted(clusters, "cluster"),
-        counted(document["gates"].as_u64().unwrap_or(0), "gate"),
+        counted(number(&document["gates"]), "gate"),
         explained.join(", "),
     );
     if clusters == 1 {
         return text + "There is no other cluster to compare it with.\n";
     }
-    let used = list("pairs").iter().filter_map(|pair| pair["modes"].as_u64());
+    let used = list("pairs").iter().map(|pair| number(&pair["modes"]));
     let [fewest, most] = [used.clone().min().unwrap_or(0), used.max().unwrap_or(0)];
     let modes = match modes {
         Modes::First(_) => counted(most, "mode"),
@@ -210,12 +216,4 @@ fn text(document: &Value, modes: Modes) -> String {
         text += "\nDistances in different numbers of modes (the first number of df) are not comparable.\n";
     }
     text
-}
-
-/// So many of them, in words.
-fn counted(count: u64, what: &str) -> String {
-    match count {
-        1 => format!("1 {what}"),
-        _ => format!("{count} {what}s"),
-    }
 }

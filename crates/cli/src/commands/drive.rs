@@ -9,13 +9,13 @@ use toml::Table as Toml;
 use crate::args;
 use crate::config::Config;
 use crate::dataset::{DataSetToWrite, Log, Rows, run_name, write_dataset};
-use crate::figures;
+use crate::figures::{self, DrawnRun};
 use crate::interrupt;
 use crate::laps::{self, SampledRun, mean_and_deviation};
 use crate::output::{OutDir, Work, sha256};
 use crate::session::Session;
 use crate::setup::{self, Setup, locate};
-use crate::table::Table;
+use crate::table::{Table, counted};
 
 pub(crate) fn run(session: &Session, args: &args::Drive) -> Result<()> {
     if let Some(name) = &args.name {
@@ -84,10 +84,18 @@ pub(crate) fn run(session: &Session, args: &args::Drive) -> Result<()> {
         config.world = "world.toml".into();
     }
     out.write("model.toml", config.to_toml())?;
-    let labelled = sampled.iter().map(|run| (format!("run {}", run.run), run));
+    let drawn: Vec<DrawnRun<'_>> = sampled
+        .iter()
+        .zip(&driven)
+        .map(|(run, (_, rows))| DrawnRun {
+            label: format!("run {}", run.run),
+            laps: &run.laps,
+            rest: rest(run, rows),
+        })
+        .collect();
     out.write(
         "laps.svg",
-        figures::laps_map(setup.scene.circuit(), labelled).to_svg()?,
+        figures::laps_map(setup.scene.circuit(), &drawn).to_svg()?,
     )?;
     let document = summary(&name, &sampled, &driven);
     out.write("summary.json", format!("{document:#}\n"))?;
@@ -159,6 +167,18 @@ fn record(setup: &Setup, seed: u64, run: usize, laps: usize, log: bool) -> Resul
         },
     )?;
     Ok((drive, rows))
+}
+
+/// What a run drove after its last lap kept, m, where it timed out or has none.
+fn rest(run: &SampledRun, rows: &Rows) -> Vec<[f64; 2]> {
+    if !run.timed_out && !run.laps.is_empty() {
+        return Vec::new();
+    }
+    let from_s = run.laps.last().map_or(0.0, |lap| lap.end_s);
+    let seen = rows.since_start_s().zip(&rows.position_m);
+    seen.filter(|(t_s, _)| *t_s >= from_s)
+        .filter_map(|(_, position_m)| *position_m)
+        .collect()
 }
 
 /// What an experimenter sets and a reader of the laps must know: the controller's settings and the driving direction.
@@ -249,11 +269,7 @@ fn text(args: &args::Drive, document: &Value) -> String {
             seconds(&run["lap_time_s"]),
             seconds(&run["lap_time_deviation_s"]),
             run["contact_steps"].to_string(),
-            if run["timed_out"] == true {
-                "timed out".into()
-            } else {
-                "closed".to_owned()
-            },
+            ending(run),
         ]);
     }
     format!(
@@ -262,4 +278,15 @@ fn text(args: &args::Drive, document: &Value) -> String {
         args.out.display(),
         document["data_set"].as_str().unwrap_or("")
     )
+}
+
+/// How a run ended, and what became of laps that are not there.
+fn ending(run: &Value) -> String {
+    let missed = run["set_aside"].as_array().map_or(0, Vec::len);
+    match (run["timed_out"] == true, missed) {
+        (true, 0) => "timed out".into(),
+        (false, 0) => "closed".into(),
+        (true, _) => format!("timed out, {} missed a gate", counted(missed, "lap")),
+        (false, _) => format!("{} missed a gate", counted(missed, "lap")),
+    }
 }
