@@ -717,37 +717,39 @@ fn names_that_no_table_could_show() {
     }
 }
 
-/// Ctrl-C on a command that cannot resume.
+/// Ctrl-C on a command that cannot resume, between runs and within one.
 #[cfg(unix)]
 #[test]
 fn an_interrupted_drive_leaves_nothing() {
-    let scratch = Scratch::new();
-    let mut child = scratch
-        .command([
-            "drive",
-            "roduit2007",
-            "--runs",
-            "100000",
-            "--laps",
-            "20",
-            "--out",
-            "o",
-        ])
-        .stdout(std::process::Stdio::piped())
-        .stderr(std::process::Stdio::piped())
-        .spawn()
-        .unwrap();
-    while !scratch.path("o.partial").exists() {
-        assert_eq!(child.try_wait().unwrap(), None);
-        std::thread::yield_now();
+    for [runs, laps] in [["100000", "20"], ["1", "100000"]] {
+        let scratch = Scratch::new();
+        let mut child = scratch
+            .command([
+                "drive",
+                "roduit2007",
+                "--runs",
+                runs,
+                "--laps",
+                laps,
+                "--out",
+                "o",
+            ])
+            .stdout(std::process::Stdio::piped())
+            .stderr(std::process::Stdio::piped())
+            .spawn()
+            .unwrap();
+        while !scratch.path("o.partial").exists() {
+            assert_eq!(child.try_wait().unwrap(), None);
+            std::thread::yield_now();
+        }
+        let signal = std::process::Command::new("kill")
+            .args(["-INT", &child.id().to_string()])
+            .status()
+            .unwrap();
+        assert!(signal.success());
+        let ran = Ran::from(child.wait_with_output().unwrap());
+        assert_eq!(ran.stderr, "lapwing: interrupted: nothing was written\n");
+        assert_eq!((ran.status, ran.stdout.as_str()), (Some(2), ""));
+        assert!(crate::support::files(&scratch.path("")).is_empty());
     }
-    let signal = std::process::Command::new("kill")
-        .args(["-INT", &child.id().to_string()])
-        .status()
-        .unwrap();
-    assert!(signal.success());
-    let ran = Ran::from(child.wait_with_output().unwrap());
-    assert_eq!(ran.stderr, "lapwing: interrupted: nothing was written\n");
-    assert_eq!((ran.status, ran.stdout.as_str()), (Some(2), ""));
-    assert!(crate::support::files(&scratch.path("")).is_empty());
 }

@@ -1,5 +1,7 @@
 //! `lapwing drive`: simulated laps as a data set.
 
+use std::ops::ControlFlow;
+
 use anyhow::{Result, ensure};
 use rayon::prelude::*;
 use serde_json::{Value, json};
@@ -10,7 +12,7 @@ use crate::args;
 use crate::config::Config;
 use crate::dataset::{DataSetToWrite, Log, Rows, run_name, write_dataset};
 use crate::figures::{self, DrawnRun};
-use crate::interrupt;
+use crate::interrupt::{self, Interrupted};
 use crate::laps::{self, SampledRun, mean_and_deviation};
 use crate::output::{OutDir, Work, sha256};
 use crate::session::Session;
@@ -40,11 +42,14 @@ pub(crate) fn run(session: &Session, args: &args::Drive) -> Result<()> {
     let driven: Vec<(Drive, Rows)> = (0..runs)
         .into_par_iter()
         .map(|run| {
-            interrupt::check()?;
             let driven = record(&setup, session.seed(), run, laps, args.log);
-            let driven = driven.map_err(|error| locate(&file, &source, error))?;
-            progress.tick(1);
-            anyhow::Ok(driven)
+            match driven.map_err(|error| locate(&file, &source, error))? {
+                ControlFlow::Break(interrupted) => Err(anyhow::Error::from(interrupted)),
+                ControlFlow::Continue(driven) => {
+                    progress.tick(1);
+                    Ok(driven)
+                }
+            }
         })
         .collect::<Result<_>>()?;
     drop(progress);
@@ -59,10 +64,10 @@ pub(crate) fn run(session: &Session, args: &args::Drive) -> Result<()> {
         .map(|(i, (drive, _))| laps::simulated(&name, i, drive, laps))
         .collect();
     let shipped = source.path.is_none();
-    let rows: Vec<(String, Rows)> = driven
+    let rows: Vec<(String, &Rows)> = driven
         .iter()
         .enumerate()
-        .map(|(i, (_, rows))| (run_name(i), rows.clone()))
+        .map(|(i, (_, rows))| (run_name(i), rows))
         .collect();
     if !shipped {
         out.write("world.toml", &source.text)?;
@@ -99,6 +104,7 @@ pub(crate) fn run(session: &Session, args: &args::Drive) -> Result<()> {
     )?;
     let document = summary(&name, &sampled, &driven);
     out.write("summary.json", format!("{document:#}\n"))?;
+    interrupt::check()?;
     out.finish(&session.manifest(configuration, inputs))?;
 
     for remark in sampled.iter().flat_map(SampledRun::remarks) {
@@ -144,29 +150,34 @@ fn caster(name: &str) -> Option<CasterKind> {
         .map(|(_, kind)| *kind)
 }
 
-/// Drives one run and keeps its rows.
-fn record(setup: &Setup, seed: u64, run: usize, laps: usize, log: bool) -> Result<(Drive, Rows), sim::Error> {
+/// Drives one run and keeps its rows, unless it is interrupted.
+fn record(
+    setup: &Setup,
+    seed: u64,
+    run: usize,
+    laps: usize,
+    log: bool,
+) -> Result<ControlFlow<Interrupted, (Drive, Rows)>, sim::Error> {
     let mut rows = Rows {
         log: log.then(Log::default),
         ..Rows::default()
     };
-    let drive = setup.drive(
-        Streams {
-            seed,
-            run: run as u64,
-        },
-        laps,
-        |step: &Step| {
-            rows.t_s.push(step.time_s);
-            rows.position_m.push(Some([step.observed.x, step.observed.y]));
-            if let Some(log) = &mut rows.log {
-                log.readings.push(step.readings);
-                log.left_m_s.push(step.command.left_m_s);
-                log.right_m_s.push(step.command.right_m_s);
-            }
-        },
-    )?;
-    Ok((drive, rows))
+    let streams = Streams {
+        seed,
+        run: run as u64,
+    };
+    let world = setup.scene.world(&setup.model, run)?;
+    let drive = sim::drive_until(&world, streams, None, laps, |step: &Step| {
+        rows.t_s.push(step.time_s);
+        rows.position_m.push(Some([step.observed.x, step.observed.y]));
+        if let Some(log) = &mut rows.log {
+            log.readings.push(step.readings);
+            log.left_m_s.push(step.command.left_m_s);
+            log.right_m_s.push(step.command.right_m_s);
+        }
+        interrupt::check().map_or_else(ControlFlow::Break, ControlFlow::Continue)
+    })?;
+    Ok(drive.map_continue(|drive| (drive, rows)))
 }
 
 /// What a run drove after its last lap kept, m, where it timed out or has none.
