@@ -701,37 +701,55 @@ fn a_file_that_may_not_grow() {
     }
 }
 
-/// Ctrl-C on a command that cannot resume.
+#[test]
+fn names_that_no_table_could_show() {
+    let scratch = Scratch::new();
+    for (name, shown) in [
+        ("", "\"\""),
+        (" ", "\" \""),
+        ("a\nb", "\"a\\nb\""),
+        ("\u{1b}[2J", "\"\\u{1b}[2J\""),
+    ] {
+        scratch.refuses(
+            &["drive", "roduit2007", "--name", name, "--out", "o"],
+            &format!("--name {shown}: a name on one line is needed, of more than spaces and without control characters"),
+        );
+    }
+}
+
+/// Ctrl-C on a command that cannot resume, between runs and within one.
 #[cfg(unix)]
 #[test]
 fn an_interrupted_drive_leaves_nothing() {
-    let scratch = Scratch::new();
-    let mut child = scratch
-        .command([
-            "drive",
-            "roduit2007",
-            "--runs",
-            "100000",
-            "--laps",
-            "20",
-            "--out",
-            "o",
-        ])
-        .stdout(std::process::Stdio::piped())
-        .stderr(std::process::Stdio::piped())
-        .spawn()
-        .unwrap();
-    while !scratch.path("o.partial").exists() {
-        assert_eq!(child.try_wait().unwrap(), None);
-        std::thread::yield_now();
+    for [runs, laps] in [["100000", "20"], ["1", "100000"]] {
+        let scratch = Scratch::new();
+        let mut child = scratch
+            .command([
+                "drive",
+                "roduit2007",
+                "--runs",
+                runs,
+                "--laps",
+                laps,
+                "--out",
+                "o",
+            ])
+            .stdout(std::process::Stdio::piped())
+            .stderr(std::process::Stdio::piped())
+            .spawn()
+            .unwrap();
+        while !scratch.path("o.partial").exists() {
+            assert_eq!(child.try_wait().unwrap(), None);
+            std::thread::yield_now();
+        }
+        let signal = std::process::Command::new("kill")
+            .args(["-INT", &child.id().to_string()])
+            .status()
+            .unwrap();
+        assert!(signal.success());
+        let ran = Ran::from(child.wait_with_output().unwrap());
+        assert_eq!(ran.stderr, "lapwing: interrupted: nothing was written\n");
+        assert_eq!((ran.status, ran.stdout.as_str()), (Some(2), ""));
+        assert!(crate::support::files(&scratch.path("")).is_empty());
     }
-    let signal = std::process::Command::new("kill")
-        .args(["-INT", &child.id().to_string()])
-        .status()
-        .unwrap();
-    assert!(signal.success());
-    let ran = Ran::from(child.wait_with_output().unwrap());
-    assert_eq!(ran.stderr, "lapwing: interrupted: nothing was written\n");
-    assert_eq!((ran.status, ran.stdout.as_str()), (Some(2), ""));
-    assert!(crate::support::files(&scratch.path("")).is_empty());
 }

@@ -4,10 +4,12 @@
 
 mod case_study;
 mod cli;
+mod comparing;
 mod controls;
 mod damaged;
 mod declared;
 mod determinism;
+mod driving;
 mod effects_in_logs;
 mod errors;
 #[path = "../benches/ground/mod.rs"]

@@ -164,15 +164,17 @@ pub(crate) struct Drive {
 /// test (eq. 9) and the energy test.
 ///
 /// Each of the arguments is a data set (a folder; every run is a cluster), one run's CSV, or with --sampled a table of
-/// laps that are sampled already.
+/// laps that are sampled already. Clusters are named after data set and run, or after the table; names that repeat give
+/// way to the paths as they were given.
 #[derive(Debug, Args)]
 pub(crate) struct Compare {
     /// Data sets, runs, or gate tables
     #[arg(required = true, value_name = "DATA")]
     pub(crate) data: Vec<PathBuf>,
-    /// Modes of the PDM to compare in: a number, or all
-    #[arg(long, default_value = "2", value_name = "R")]
-    pub(crate) modes: String,
+    /// Modes of the PDM to compare in: a number, or all, which is as many as each pair has laps for [default: 2, or 1 where
+    /// there is no second]
+    #[arg(long, value_name = "R")]
+    pub(crate) modes: Option<String>,
     /// The arguments are CSV files with one row per lap and one numeric column per coordinate
     #[arg(long)]
     pub(crate) sampled: bool,
@@ -180,12 +182,13 @@ pub(crate) struct Compare {
     #[arg(long, default_value_t = 999, value_name = "N")]
     pub(crate) permutations: u32,
     /// World file to use instead of the one that the data sets name
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", conflicts_with = "sampled")]
     pub(crate) world: Option<PathBuf>,
     /// Print one JSON document instead of tables
     #[arg(long)]
     pub(crate) json: bool,
-    /// Folder for tables and pictures, in place of an earlier result there
+    /// Folder for tables, pictures, the laps as gate tables and their places in the modes, in place of an earlier result
+    /// there
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
 }

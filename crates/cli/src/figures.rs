@@ -7,12 +7,32 @@ use chart::{
 };
 use pdm::{Modes, Pdm, Projection, covariance_ellipse};
 use sim::Circuit;
-use track::{Course, Wall};
-
-use crate::laps::SampledRun;
+use track::{Course, Lap, Wall};
 
 /// Millimetres in a metre.
 pub(crate) const MM: f64 = 1000.0;
+
+/// How a drawing of the modes shows lengths.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Scale {
+    /// What one becomes.
+    factor: f64,
+    /// The unit as it stands behind the name of an axis.
+    unit: &'static str,
+}
+
+impl Scale {
+    /// Metres in mm.
+    pub(crate) const MM: Self = Self {
+        factor: MM,
+        unit: ", mm",
+    };
+    /// Numbers of a unit that nobody said, as they are.
+    pub(crate) const PLAIN: Self = Self {
+        factor: 1.0,
+        unit: "",
+    };
+}
 
 /// The outlines of both walls.
 pub(crate) fn walls(course: &Course) -> Mark {
@@ -131,41 +151,86 @@ pub(crate) fn single(title: &str, description: &str, panel: Panel) -> Figure {
     }
 }
 
-/// The laps of several runs over the walls; a lap's path is its positions at the gates.
-pub(crate) fn laps_map(circuit: &Circuit, runs: &[SampledRun]) -> Figure {
-    let mut marks = vec![walls(&circuit.course)];
-    for (i, run) in runs.iter().enumerate() {
-        let lap = |lap: &track::Lap| {
+/// A run as it stands on a map.
+#[derive(Debug, Clone)]
+pub(crate) struct DrawnRun<'r> {
+    pub(crate) label: String,
+    pub(crate) laps: &'r [Lap],
+    /// What was driven after the last lap kept up to where the robot stopped, m; empty where that is not shown.
+    pub(crate) rest: Vec<[f64; 2]>,
+}
+
+impl DrawnRun<'_> {
+    fn marks(&self, circuit: &Circuit, color: Color) -> Vec<Mark> {
+        let lap = |lap: &Lap| {
             let mut points = crossings(circuit, &lap.offsets_m);
             points.extend([points[0], GAP]);
             points
         };
-        let points: Vec<[f64; 2]> = run.laps.iter().flat_map(lap).collect();
+        let points: Vec<[f64; 2]> = self.laps.iter().flat_map(lap).collect();
         let style = Style {
             width_px: 0.7,
             opacity: 0.6,
-            ..Style::color(palette(i))
+            ..Style::color(color)
         };
-        marks.push(Mark::new(format!("run {}", run.run), style, Shape::Line(points)));
+        let mut marks = Vec::new();
+        if !points.is_empty() {
+            marks.push(Mark::new(&self.label, style, Shape::Line(points)));
+        }
+        if let Some(&end) = self.rest.last() {
+            let way = if self.laps.is_empty() {
+                "no lap kept:"
+            } else {
+                "on"
+            };
+            let label = format!("{}, {way} to where it stopped", self.label);
+            let stop = Style {
+                marker: Marker::Cross,
+                size_px: 10.0,
+                width_px: 2.0,
+                ..Style::color(color)
+            };
+            marks.push(Mark::new(
+                &label,
+                line(color, Dash::Dashed, 1.0),
+                Shape::Line(self.rest.clone()),
+            ));
+            marks.push(Mark::new(&label, stop, Shape::Points(vec![end])));
+        }
+        marks
     }
-    single(
-        "Laps",
-        "Every lap kept, drawn through its positions at the gates.",
-        map("", marks),
-    )
+}
+
+/// The laps of several runs over the walls; a lap's path is its positions at the gates.
+pub(crate) fn laps_map(circuit: &Circuit, runs: &[DrawnRun<'_>]) -> Figure {
+    let mut marks = vec![walls(&circuit.course)];
+    for (i, run) in runs.iter().enumerate() {
+        marks.extend(run.marks(circuit, palette(i)));
+    }
+    let mut description = String::from("Every lap kept, drawn through its positions at the gates.");
+    if runs.iter().any(|run| !run.rest.is_empty()) {
+        description +=
+            " Dashed what was driven after the last of them, with a cross where the robot stopped.";
+    }
+    single("Laps", &description, map("", marks))
 }
 
 /// A cluster in the plane of the first two modes: its laps and the ellipse of two standard deviations.
-pub(crate) fn cluster_marks(projection: &Projection, label: &str, style: Style) -> Vec<Mark> {
+pub(crate) fn cluster_marks(
+    projection: &Projection,
+    label: &str,
+    style: Style,
+    Scale { factor, .. }: Scale,
+) -> Vec<Mark> {
     let points = projection.points();
     let laps = (0..points.nrows())
-        .map(|k| [MM * points[(k, 0)], MM * points[(k, 1)]])
+        .map(|k| [factor * points[(k, 0)], factor * points[(k, 1)]])
         .collect();
     let mut marks = vec![Mark::new(label, style, Shape::Points(laps))];
     if let Ok(ellipse) = covariance_ellipse(projection, 2.0) {
         let shape = Shape::Ellipses(vec![Ellipse {
-            center: ellipse.centre.map(|c| MM * c),
-            semi_axes: ellipse.semi_axes.map(|a| MM * a),
+            center: ellipse.centre.map(|c| factor * c),
+            semi_axes: ellipse.semi_axes.map(|a| factor * a),
             angle_rad: ellipse.angle_rad,
         }]);
         marks.push(Mark::new(
@@ -183,10 +248,10 @@ pub(crate) fn cluster_marks(projection: &Projection, label: &str, style: Style) 
 }
 
 /// The axes of the plane of the first two modes.
-pub(crate) fn modes_panel(title: &str, pdm: &Pdm, marks: Vec<Mark>) -> Panel {
+pub(crate) fn modes_panel(title: &str, pdm: &Pdm, marks: Vec<Mark>, Scale { unit, .. }: Scale) -> Panel {
     let axis = |mode: usize| {
         let share = 100.0 * pdm.explained().get(mode).copied().unwrap_or(0.0);
-        Axis::linear(format!("mode {}, mm ({share:.0} % of the variance)", mode + 1))
+        Axis::linear(format!("mode {}{unit} ({share:.0} % of the variance)", mode + 1))
     };
     Panel {
         title: title.into(),
@@ -199,16 +264,21 @@ pub(crate) fn modes_panel(title: &str, pdm: &Pdm, marks: Vec<Mark>) -> Panel {
 }
 
 /// All clusters of a PDM in the plane of its first two modes.
-pub(crate) fn modes_figure(pdm: &Pdm, clusters: &[pdm::Cluster]) -> Result<Figure> {
+pub(crate) fn modes_figure(pdm: &Pdm, clusters: &[pdm::Cluster], scale: Scale) -> Result<Figure> {
     let mut marks = Vec::new();
     for (i, cluster) in clusters.iter().enumerate() {
         let projection = pdm.project(cluster, Modes::First(2))?;
-        marks.extend(cluster_marks(&projection, cluster.name(), Style::series(i)));
+        marks.extend(cluster_marks(
+            &projection,
+            cluster.name(),
+            Style::series(i),
+            scale,
+        ));
     }
     Ok(single(
         "Point Distribution Model",
         "Every lap in the plane of the first two modes, with an ellipse of two standard deviations round each cluster.",
-        modes_panel("", pdm, marks),
+        modes_panel("", pdm, marks, scale),
     ))
 }
 
@@ -265,10 +335,10 @@ pub(crate) struct Shown<'a> {
 pub(crate) fn plane(title: &str, pdm: &Pdm, clusters: &[Shown<'_>]) -> Panel {
     let marks = clusters
         .iter()
-        .flat_map(|shown| cluster_marks(shown.projection, &shown.label, shown.style));
+        .flat_map(|shown| cluster_marks(shown.projection, &shown.label, shown.style, Scale::MM));
     Panel {
         size_px: [380.0, 300.0],
-        ..modes_panel(title, pdm, marks.collect())
+        ..modes_panel(title, pdm, marks.collect(), Scale::MM)
     }
 }
 

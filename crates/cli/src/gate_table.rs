@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::Result;
+use pdm::Cluster;
 
 use crate::dataset::CsvFile;
 use crate::output::Input;
@@ -54,6 +55,37 @@ impl GateTable {
     }
 }
 
+/// The text of a gate table, which gives back the same bits: K rows of N positions as they were sampled.
+pub(crate) fn to_csv(cluster: &Cluster) -> String {
+    let header = (0..cluster.dimension()).map(|gate| format!("gate_{gate}"));
+    let mut csv = header.collect::<Vec<_>>().join(",") + "\n";
+    for lap in cluster.laps().row_iter() {
+        let numbers = lap.iter().map(f64::to_string);
+        csv += &(numbers.collect::<Vec<_>>().join(",") + "\n");
+    }
+    csv
+}
+
+/// The names of the clusters as files may be called, all different, on a disk that knows no capitals too.
+pub(crate) fn file_names(clusters: &[Cluster]) -> Vec<String> {
+    let safe = |c: char| {
+        if c.is_alphanumeric() || "-_.".contains(c) {
+            c
+        } else {
+            '_'
+        }
+    };
+    let mut names: Vec<String> = Vec::with_capacity(clusters.len());
+    for cluster in clusters {
+        let plain: String = cluster.name().chars().map(safe).collect();
+        let numbered = (2..).map(|number| format!("{plain}_{number}"));
+        let mut free = std::iter::once(plain.clone()).chain(numbered);
+        let same = |a: &String, b: &String| a.to_lowercase() == b.to_lowercase();
+        names.extend(free.find(|name| !names.iter().any(|other| same(other, name))));
+    }
+    names
+}
+
 /// Columns may well be named by whole numbers, those of the gates, but not by fractions.
 fn looks_like_a_lap(header: &[String]) -> bool {
     header.iter().all(|name| name.parse::<f64>().is_ok())
@@ -82,6 +114,26 @@ mod tests {
         assert_eq!(table.name, "laps.of.mine");
         assert_eq!(table.header, ["0", "1", "2"]);
         assert_eq!(table.rows, [[0.5, -1.0, 1e-3], [1.0, 2.0, 3.0]]);
+    }
+
+    #[test]
+    fn a_cluster_comes_back_bit_by_bit() {
+        let laps = [vec![0.1, -1.0 / 3.0, 1e-300], vec![f64::MIN_POSITIVE, -0.0, 5.0]];
+        let csv = to_csv(&Cluster::new("a", &laps).unwrap());
+        assert!(csv.starts_with("gate_0,gate_1,gate_2\n0.1,"));
+        let rows = load(&csv).unwrap().rows;
+        assert_eq!(rows, laps);
+        assert!(rows[1][1].is_sign_negative());
+    }
+
+    #[test]
+    fn clusters_have_files_of_their_own() {
+        let cluster = |name: &str| Cluster::new(name, &[vec![0.0]]).unwrap();
+        let clusters = ["set/a", "set_a", "../set, é/b", "set a"].map(cluster);
+        assert_eq!(
+            file_names(&clusters),
+            ["set_a", "set_a_2", ".._set__é_b", "set_a_3"]
+        );
     }
 
     #[test]

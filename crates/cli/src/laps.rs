@@ -16,8 +16,10 @@ use crate::sightings::{lost, without_strays};
 /// The laps of one run that are analysed, and what was set aside.
 #[derive(Debug, Clone)]
 pub(crate) struct SampledRun {
-    /// `<data set>/<run>`.
+    /// `<data set>/<run>`, or where that does not tell it from others the path it was read from.
     pub(crate) name: String,
+    /// The name of its data set.
+    pub(crate) set: String,
     /// The name of the run alone.
     pub(crate) run: String,
     /// Closed laps, the first whole lap of the run not among them.
@@ -62,6 +64,7 @@ impl SampledRun {
         }
         Self {
             name: format!("{set}/{run}"),
+            set: set.to_owned(),
             run: run.to_owned(),
             laps,
             set_aside,
@@ -85,12 +88,6 @@ impl SampledRun {
             gate,
             time_s: lap.start_s - until_s(gate),
         }
-    }
-
-    /// The name of its data set.
-    pub(crate) fn set(&self) -> &str {
-        let own = self.name.len() - self.run.len();
-        self.name[..own].trim_end_matches('/')
     }
 
     /// Positions at the gates, laps x gates, m.
@@ -244,12 +241,16 @@ pub(crate) fn simulated(name: &str, run: usize, drive: &Drive, wanted: usize) ->
     }
 }
 
-/// Mean and standard deviation (divisor n - 1).
+/// Mean and standard deviation (divisor n - 1); NaN where there are too few for it.
 pub(crate) fn mean_and_deviation(values: &[f64]) -> (f64, f64) {
     let n = values.len() as f64;
     let mean = values.iter().sum::<f64>() / n;
     let squares: f64 = values.iter().map(|v| (v - mean) * (v - mean)).sum();
-    (mean, (squares / (n - 1.0)).sqrt())
+    let deviation = match values {
+        [] | [_] => f64::NAN,
+        _ => (squares / (n - 1.0)).sqrt(),
+    };
+    (mean, deviation)
 }
 
 #[cfg(test)]
@@ -270,6 +271,15 @@ mod tests {
         };
         let whole: Vec<Lap> = (0..4).map(lap).collect();
         SampledRun::new("set", "a", &whole, 3, |_| None)
+    }
+
+    #[test]
+    fn one_value_has_no_deviation_and_none_has_no_mean() {
+        let (mean, deviation) = mean_and_deviation(&[]);
+        assert!(mean.is_nan() && deviation.is_nan(), "{mean} {deviation}");
+        let (mean, deviation) = mean_and_deviation(&[3.0]);
+        assert!(mean == 3.0 && deviation.is_nan(), "{mean} {deviation}");
+        assert_eq!(mean_and_deviation(&[1.0, 3.0]), (2.0, 2.0_f64.sqrt()));
     }
 
     #[test]

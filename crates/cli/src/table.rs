@@ -116,6 +116,14 @@ pub(crate) fn escape(text: &str) -> String {
         .replace('"', "&quot;")
 }
 
+/// So many of them, in words.
+pub(crate) fn counted(count: usize, what: &str) -> String {
+    match count {
+        1 => format!("1 {what}"),
+        _ => format!("{count} {what}s"),
+    }
+}
+
 /// A probability as a reader wants it: three decimals, or the power of ten of a small one.
 pub(crate) fn probability(p: f64) -> String {
     if p >= 0.001 {

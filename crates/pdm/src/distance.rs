@@ -40,7 +40,8 @@ pub fn mahalanobis(point: &[f64], cluster: &Projection) -> Result<f64, Error> {
 /// The distance of the means of two clusters, measured with their pooled covariance (eq. 8 with eq. 7).
 ///
 /// It is in standard deviations and stays the same under every invertible linear map of the modes. With [`Modes::All`]
-/// it is measured in at most `n_x + n_y - 2` modes. Both must be projections of the same model.
+/// it is measured in at most `n_x + n_y - 2` modes, and so says little beside that of a pair with more laps or fewer. Both
+/// must be projections of the same model.
 ///
 /// # Errors
 /// [`Error::Dimension`] for projections with different numbers of modes, [`Error::TooFewLaps`] where a cluster has fewer

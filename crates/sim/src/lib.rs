@@ -39,7 +39,7 @@ pub use model::{Machine, Model, RunRules, WallRules};
 pub use noise::{Stream, Streams};
 pub use outlook::{Look, Outlook, Places};
 pub use robot::{Pose, Robot, Twist, WheelSpeeds};
-pub use run::{Drive, Run, Start, Step, drive, drive_from};
+pub use run::{Drive, Run, Start, Step, drive, drive_from, drive_until};
 pub use sensor::{Beam, Combine, Mount, ReadingNoise, Readings, Response};
 pub use tape::{Draws, Tape};
 pub use track::Vec2;

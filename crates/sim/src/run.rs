@@ -1,5 +1,8 @@
 //! One robot driving: sense, decide, act, move, observe.
 
+use std::convert::Infallible;
+use std::ops::ControlFlow;
+
 use track::{Lap, LapTracker, Vec2, Way};
 
 use crate::apparatus::Apparatus;
@@ -355,6 +358,25 @@ pub fn drive_from<'w>(
     laps: usize,
     mut record: impl FnMut(&Step),
 ) -> Result<Drive, Error> {
+    let driven = drive_until(world, draws, start, laps, |step| {
+        record(step);
+        ControlFlow::<Infallible>::Continue(())
+    });
+    let ControlFlow::Continue(drive) = driven?;
+    Ok(drive)
+}
+
+/// [`drive_from`] that ends at once where `record` breaks off, with what that said.
+///
+/// # Errors
+/// As [`drive`].
+pub fn drive_until<'w, B>(
+    world: &'w World<'w>,
+    draws: impl Into<Draws<'w>>,
+    start: Option<Start>,
+    laps: usize,
+    mut record: impl FnMut(&Step) -> ControlFlow<B>,
+) -> Result<ControlFlow<B, Drive>, Error> {
     let mut run = Run::from_start(world, draws, start)?;
     let mut tracker = LapTracker::new(&world.circuit().gates, world.rules().way);
     let mut done: Vec<Lap> = Vec::new();
@@ -362,7 +384,9 @@ pub fn drive_from<'w>(
     let mut latest_s = run.start_s;
     let timed_out = loop {
         let step = run.step();
-        record(&step);
+        if let ControlFlow::Break(reason) = record(&step) {
+            return Ok(ControlFlow::Break(reason));
+        }
         if let Some(lap) = tracker.push(step.time_s, step.observed) {
             latest_s = step.time_s;
             done.push(lap);
@@ -378,14 +402,17 @@ pub fn drive_from<'w>(
     let kept = done.split_off(done.len().min(1));
     let (contacts, steps) = (run.contacts, run.steps);
     if !timed_out {
-        (0..SPARE_STEPS).for_each(|_| record(&run.step()));
+        let spare = (0..SPARE_STEPS).try_for_each(|_| record(&run.step()));
+        if let ControlFlow::Break(reason) = spare {
+            return Ok(ControlFlow::Break(reason));
+        }
     }
-    Ok(Drive {
+    Ok(ControlFlow::Continue(Drive {
         laps: kept,
         contacts,
         timed_out,
         steps,
-    })
+    }))
 }
 
 /// Steps recorded after the last lap has closed, so that it also closes in a file whose positions are rounded.
@@ -407,6 +434,24 @@ mod tests {
         let start = Some(Start { gate, time_s: 0.0 });
         let drawn = drive(&world, streams, LAPS, |_| {}).unwrap();
         assert_eq!(drive_from(&world, streams, start, LAPS, |_| {}).unwrap(), drawn);
+    }
+
+    #[test]
+    fn a_drive_ends_where_its_record_breaks_off() {
+        let world = scene().world(&declared(), 0).unwrap();
+        let streams = Streams { seed: 4, run: 2 };
+        let mut steps = 0;
+        let driven = drive_until(&world, streams, None, 10_000, |step| {
+            steps += 1;
+            if step.time_s < 100.0 {
+                ControlFlow::Continue(())
+            } else {
+                ControlFlow::Break("enough")
+            }
+        });
+        assert_eq!(driven.unwrap(), ControlFlow::Break("enough"));
+        let step_s = world.rules().control_step_s;
+        assert_eq!(steps, (100.0 / step_s).ceil() as u64 + 1);
     }
 
     #[test]

@@ -1,38 +1,38 @@
 //! `lapwing compare`: one Point Distribution Model of all clusters, and every pair in it.
 
-use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+mod clusters;
 
-use anyhow::{Context, Result, bail, ensure};
-use pdm::{Cluster, Modes, Pdm, TestResult};
+use anyhow::{Context, Result, bail};
+use pdm::{Cluster, Modes, Pdm, Projection, TestResult};
 use serde_json::{Value, json};
-use sim::Circuit;
-use std::sync::Arc;
 
 use crate::args::Compare;
-use crate::config::Config;
-use crate::dataset::{self, DataSet};
-use crate::figures;
-use crate::gate_table::GateTable;
+use crate::figures::{self, DrawnRun, Scale};
+use crate::gate_table;
 use crate::interrupt;
-use crate::laps::{Measured, SampledRun};
-use crate::output::{Input, OutDir, Work};
+use crate::laps::SampledRun;
+use crate::output::{OutDir, Work};
 use crate::session::Session;
-use crate::setup;
-use crate::table::{Table, probability};
+use crate::table::{Table, counted, probability};
 
 pub(crate) fn run(session: &Session, args: &Compare) -> Result<()> {
-    let modes = parse_modes(&args.modes)?;
+    let asked = args.modes.as_deref().map(parse_modes).transpose()?;
     let clusters = if args.sampled {
-        tables(&args.data)?
+        clusters::tables(&args.data)?
     } else {
-        data_sets(session, args)?
+        clusters::data_sets(session, args)?
     };
     let pdm = Pdm::fit(&clusters.list)?;
-    let document = compare(session, &pdm, &clusters.list, modes, args.permutations)?;
+    let modes = asked.unwrap_or_else(|| usual_modes(&pdm));
+    let projections: Vec<Projection> = clusters
+        .list
+        .iter()
+        .map(|cluster| pdm.project(cluster, modes))
+        .collect::<Result<_, _>>()?;
+    let document = compare(session, &pdm, &clusters.list, &projections, args.permutations)?;
     if let Some(out) = &args.out {
         let configuration =
-            json!({ "data": args.data, "modes": args.modes, "permutations": args.permutations });
+            json!({ "data": args.data, "modes": shown(modes), "permutations": args.permutations });
         let folder = OutDir::create(
             out,
             &Work::new("compare", &configuration),
@@ -40,31 +40,38 @@ pub(crate) fn run(session: &Session, args: &Compare) -> Result<()> {
             false,
         )?;
         folder.write("compare.json", format!("{document:#}\n"))?;
-        folder.write("pairs.csv", pairs_csv(&document))?;
+        folder.write("pairs.csv", pairs_csv(&document)?)?;
+        folder.write("projections.csv", projections_csv(&projections)?)?;
         if pdm.degrees_of_freedom() >= 2 {
+            let scale = if args.sampled { Scale::PLAIN } else { Scale::MM };
             folder.write(
                 "modes.svg",
-                figures::modes_figure(&pdm, &clusters.list)?.to_svg()?,
+                figures::modes_figure(&pdm, &clusters.list, scale)?.to_svg()?,
             )?;
         }
         if let Some((circuit, runs)) = &clusters.course {
-            folder.write("laps.svg", figures::laps_map(circuit, runs).to_svg()?)?;
+            let label = |run: &SampledRun| match args.data.as_slice() {
+                [_] => format!("run {}", run.run),
+                _ => run.name.clone(),
+            };
+            let drawn = |run| DrawnRun {
+                label: label(run),
+                laps: &run.laps,
+                rest: Vec::new(),
+            };
+            let drawn: Vec<DrawnRun<'_>> = runs.iter().map(drawn).collect();
+            folder.write("laps.svg", figures::laps_map(circuit, &drawn).to_svg()?)?;
+            for (name, cluster) in gate_table::file_names(&clusters.list).iter().zip(&clusters.list) {
+                folder.write(&format!("laps/{name}.csv"), gate_table::to_csv(cluster))?;
+            }
         }
         folder.finish(&session.manifest(configuration, clusters.inputs))?;
     }
     if args.json {
         session.print_json(&document)
     } else {
-        session.print(&text(&document))
+        session.print(&text(&document, modes))
     }
-}
-
-/// What is compared, and where it came from.
-struct Clusters {
-    list: Vec<Cluster>,
-    inputs: Vec<Input>,
-    /// The circuit and the laps on it, where there is one.
-    course: Option<(Arc<Circuit>, Vec<SampledRun>)>,
 }
 
 fn parse_modes(text: &str) -> Result<Modes> {
@@ -77,71 +84,17 @@ fn parse_modes(text: &str) -> Result<Modes> {
     }
 }
 
-/// Gate tables.
-fn tables(paths: &[PathBuf]) -> Result<Clusters> {
-    let tables: Vec<GateTable> = paths
-        .iter()
-        .map(|path| GateTable::load(path))
-        .collect::<Result<_>>()?;
-    for table in &tables[1..] {
-        ensure!(
-            table.header.len() == tables[0].header.len(),
-            "{} has {} columns and {} has {}: laps are compared coordinate by coordinate",
-            table.path.display(),
-            table.header.len(),
-            tables[0].path.display(),
-            tables[0].header.len()
-        );
-    }
-    let cluster = |table: &GateTable| {
-        Cluster::new(&table.name, &table.rows).with_context(|| table.path.display().to_string())
-    };
-    Ok(Clusters {
-        list: tables.iter().map(cluster).collect::<Result<_>>()?,
-        inputs: tables.into_iter().map(|table| table.input).collect(),
-        course: None,
-    })
+/// The first two modes, as in the paper's figures, as far as they are there.
+fn usual_modes(pdm: &Pdm) -> Modes {
+    const USUAL: usize = 2;
+    Modes::First(USUAL.min(pdm.degrees_of_freedom()))
 }
 
-/// Data sets and single runs; each circuit is prepared once.
-fn data_sets(session: &Session, args: &Compare) -> Result<Clusters> {
-    let mut circuits: BTreeMap<(String, usize), Arc<Circuit>> = BTreeMap::new();
-    let (mut list, mut inputs, mut runs) = (Vec::new(), Vec::new(), Vec::new());
-    for path in &args.data {
-        interrupt::check()?;
-        let set = load(path)?;
-        let source = set.world_source(args.world.as_deref())?;
-        let gates = set.declared_config(&Config::shipped())?.run.gates;
-        let key = (source.text.clone(), gates);
-        if !circuits.contains_key(&key) {
-            circuits.insert(key.clone(), setup::circuit(&source, gates)?);
-            ensure!(
-                circuits.len() == 1,
-                "{}: its world or its gates differ from those of {}: laps are compared gate by gate",
-                path.display(),
-                args.data[0].display()
-            );
-        }
-        let measured = Measured::on(set, Arc::clone(&circuits[&key]), &Config::shipped())?;
-        measured
-            .runs
-            .iter()
-            .flat_map(SampledRun::remarks)
-            .for_each(|remark| session.remark(&remark));
-        list.extend(measured.clusters()?);
-        inputs.extend(measured.set.inputs);
-        runs.extend(measured.runs);
-    }
-    let course = circuits.into_values().next().map(|circuit| (circuit, runs));
-    Ok(Clusters { list, inputs, course })
-}
-
-/// A folder is a data set, a file one run.
-fn load(path: &Path) -> Result<DataSet> {
-    if path.is_file() && !path.ends_with(dataset::DESCRIPTION) {
-        dataset::load_run_csv(path)
-    } else {
-        DataSet::load(path)
+/// As on the command line.
+fn shown(modes: Modes) -> String {
+    match modes {
+        Modes::First(count) => count.to_string(),
+        Modes::All => "all".into(),
     }
 }
 
@@ -149,13 +102,9 @@ fn compare(
     session: &Session,
     pdm: &Pdm,
     clusters: &[Cluster],
-    modes: Modes,
+    projections: &[Projection],
     permutations: u32,
 ) -> Result<Value> {
-    let projections: Vec<pdm::Projection> = clusters
-        .iter()
-        .map(|cluster| pdm.project(cluster, modes))
-        .collect::<Result<_, _>>()?;
     let used = projections.first().map_or(0, |p| p.points().ncols());
     let pair_count = clusters.len() * clusters.len().saturating_sub(1) / 2;
     let progress = session.progress("comparing", pair_count as u64);
@@ -165,7 +114,7 @@ fn compare(
             interrupt::check()?;
             let t = pdm::hotelling(a, b)?;
             let mut pair = json!({
-                "a": a.name(), "b": b.name(), "distance": t.distance, "t2": t.t2,
+                "a": a.name(), "b": b.name(), "modes": t.df1, "distance": t.distance, "t2": t.t2,
                 "f": t.f, "df1": t.df1, "df2": t.df2, "p": t.p,
             });
             if permutations > 0 {
@@ -191,45 +140,65 @@ fn test(result: &TestResult) -> Value {
     json!({ "statistic": result.statistic, "p": result.p, "method": result.method })
 }
 
-fn pairs_csv(document: &Value) -> String {
-    let mut csv = String::from("a,b,distance,t2,f,df1,df2,p,energy_p\n");
+fn pairs_csv(document: &Value) -> Result<Vec<u8>> {
+    let mut csv = csv::Writer::from_writer(Vec::new());
+    csv.write_record(["a", "b", "distance", "t2", "f", "df1", "df2", "p", "energy_p"])?;
     for pair in document["pairs"].as_array().into_iter().flatten() {
         let names = ["a", "b"].map(|key| pair[key].as_str().unwrap_or("").to_owned());
         let numbers = ["distance", "t2", "f", "df1", "df2", "p"].map(|key| pair[key].to_string());
         let energy = pair["energy"]["p"]
             .as_f64()
             .map_or(String::new(), |p| p.to_string());
-        csv += &format!("{},{},{energy}\n", names.join(","), numbers.join(","));
+        csv.write_record(names.into_iter().chain(numbers).chain([energy]))?;
     }
-    csv
+    csv.into_inner().context("cannot write to memory")
 }
 
-fn text(document: &Value) -> String {
-    let explained: Vec<String> = document["explained"]
-        .as_array()
-        .into_iter()
-        .flatten()
+/// Where the laps are in the modes that are compared; laps count from 1, as the rows of the gate tables do.
+fn projections_csv(projections: &[Projection]) -> Result<Vec<u8>> {
+    let mut csv = csv::Writer::from_writer(Vec::new());
+    let modes = projections.first().map_or(0, |p| p.points().ncols());
+    let own = ["cluster", "lap"].map(str::to_owned);
+    csv.write_record(own.into_iter().chain((1..=modes).map(|r| format!("mode_{r}"))))?;
+    for projection in projections {
+        for (lap, point) in (1..).zip(projection.points().row_iter()) {
+            let own: [String; 2] = [projection.name().to_owned(), format!("{lap}")];
+            csv.write_record(own.into_iter().chain(point.iter().map(f64::to_string)))?;
+        }
+    }
+    csv.into_inner().context("cannot write to memory")
+}
+
+fn text(document: &Value, modes: Modes) -> String {
+    let list = |key: &str| document[key].as_array().map_or(&[][..], Vec::as_slice);
+    let explained: Vec<String> = list("explained")
+        .iter()
         .take(5)
         .map(|share| format!("{:.1} %", 100.0 * share.as_f64().unwrap_or(0.0)))
         .collect();
+    let number = |value: &Value| value.as_u64().unwrap_or(0) as usize;
+    let laps = list("clusters").iter().map(|c| number(&c["laps"])).sum();
+    let clusters = list("clusters").len();
     let mut text = format!(
-        "{} laps in {} clusters, {} gates; variance in the first modes: {}\n\n",
-        document["clusters"]
-            .as_array()
-            .into_iter()
-            .flatten()
-            .filter_map(|c| c["laps"].as_u64())
-            .sum::<u64>(),
-        document["clusters"].as_array().map_or(0, Vec::len),
-        document["gates"],
+        "{} in {}, {}; variance in the first modes: {}\n\n",
+        counted(laps, "lap"),
+        counted(clusters, "cluster"),
+        counted(number(&document["gates"]), "gate"),
         explained.join(", "),
     );
-    let title = format!(
-        "Inter-cluster distances in {} modes (eq. 8), Hotelling's and the energy test",
-        document["modes"]
-    );
+    if clusters == 1 {
+        return text + "There is no other cluster to compare it with.\n";
+    }
+    let used = list("pairs").iter().map(|pair| number(&pair["modes"]));
+    let [fewest, most] = [used.clone().min().unwrap_or(0), used.max().unwrap_or(0)];
+    let modes = match modes {
+        Modes::First(_) => counted(most, "mode"),
+        Modes::All if fewest == most => format!("all modes ({most} a pair)"),
+        Modes::All => format!("all modes ({fewest} to {most} a pair)"),
+    };
+    let title = format!("Inter-cluster distances in {modes} (eq. 8), Hotelling's and the energy test");
     let mut table = Table::new(title, &["a", "b", "distance", "T2", "F", "df", "p", "energy p"]);
-    for pair in document["pairs"].as_array().into_iter().flatten() {
+    for pair in list("pairs") {
         let number = |key: &str| pair[key].as_f64().unwrap_or(f64::NAN);
         table.push([
             pair["a"].as_str().unwrap_or("").to_owned(),
@@ -243,5 +212,8 @@ fn text(document: &Value) -> String {
         ]);
     }
     text += &table.to_text();
+    if fewest < most {
+        text += "\nDistances in different numbers of modes (the first number of df) are not comparable.\n";
+    }
     text
 }

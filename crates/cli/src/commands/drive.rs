@@ -1,6 +1,8 @@
 //! `lapwing drive`: simulated laps as a data set.
 
-use anyhow::Result;
+use std::ops::ControlFlow;
+
+use anyhow::{Result, ensure};
 use rayon::prelude::*;
 use serde_json::{Value, json};
 use sim::{CasterKind, Drive, Model, Pattern, Step, Streams};
@@ -9,15 +11,18 @@ use toml::Table as Toml;
 use crate::args;
 use crate::config::Config;
 use crate::dataset::{DataSetToWrite, Log, Rows, run_name, write_dataset};
-use crate::figures;
-use crate::interrupt;
+use crate::figures::{self, DrawnRun};
+use crate::interrupt::{self, Interrupted};
 use crate::laps::{self, SampledRun, mean_and_deviation};
 use crate::output::{OutDir, Work, sha256};
 use crate::session::Session;
 use crate::setup::{self, Setup, locate};
-use crate::table::Table;
+use crate::table::{Table, counted};
 
 pub(crate) fn run(session: &Session, args: &args::Drive) -> Result<()> {
+    if let Some(name) = &args.name {
+        check_name(name)?;
+    }
     let file = setup::model_file(&args.model)?;
     let world = args.model.settings.world.as_deref();
     let kind = args.caster.as_deref().and_then(caster);
@@ -37,11 +42,14 @@ pub(crate) fn run(session: &Session, args: &args::Drive) -> Result<()> {
     let driven: Vec<(Drive, Rows)> = (0..runs)
         .into_par_iter()
         .map(|run| {
-            interrupt::check()?;
             let driven = record(&setup, session.seed(), run, laps, args.log);
-            let driven = driven.map_err(|error| locate(&file, &source, error))?;
-            progress.tick(1);
-            anyhow::Ok(driven)
+            match driven.map_err(|error| locate(&file, &source, error))? {
+                ControlFlow::Break(interrupted) => Err(anyhow::Error::from(interrupted)),
+                ControlFlow::Continue(driven) => {
+                    progress.tick(1);
+                    Ok(driven)
+                }
+            }
         })
         .collect::<Result<_>>()?;
     drop(progress);
@@ -56,10 +64,10 @@ pub(crate) fn run(session: &Session, args: &args::Drive) -> Result<()> {
         .map(|(i, (drive, _))| laps::simulated(&name, i, drive, laps))
         .collect();
     let shipped = source.path.is_none();
-    let rows: Vec<(String, Rows)> = driven
+    let rows: Vec<(String, &Rows)> = driven
         .iter()
         .enumerate()
-        .map(|(i, (_, rows))| (run_name(i), rows.clone()))
+        .map(|(i, (_, rows))| (run_name(i), rows))
         .collect();
     if !shipped {
         out.write("world.toml", &source.text)?;
@@ -81,12 +89,22 @@ pub(crate) fn run(session: &Session, args: &args::Drive) -> Result<()> {
         config.world = "world.toml".into();
     }
     out.write("model.toml", config.to_toml())?;
+    let drawn: Vec<DrawnRun<'_>> = sampled
+        .iter()
+        .zip(&driven)
+        .map(|(run, (_, rows))| DrawnRun {
+            label: format!("run {}", run.run),
+            laps: &run.laps,
+            rest: rest(run, rows),
+        })
+        .collect();
     out.write(
         "laps.svg",
-        figures::laps_map(setup.scene.circuit(), &sampled).to_svg()?,
+        figures::laps_map(setup.scene.circuit(), &drawn).to_svg()?,
     )?;
     let document = summary(&name, &sampled, &driven);
     out.write("summary.json", format!("{document:#}\n"))?;
+    interrupt::check()?;
     out.finish(&session.manifest(configuration, inputs))?;
 
     for remark in sampled.iter().flat_map(SampledRun::remarks) {
@@ -97,6 +115,15 @@ pub(crate) fn run(session: &Session, args: &args::Drive) -> Result<()> {
     } else {
         session.print(&text(args, &document))
     }
+}
+
+/// Whether tables and files can call a data set so.
+fn check_name(name: &str) -> Result<()> {
+    ensure!(
+        !name.trim().is_empty() && !name.contains(char::is_control),
+        "--name {name:?}: a name on one line is needed, of more than spaces and without control characters"
+    );
+    Ok(())
 }
 
 /// Runs where nobody says how many: those that the model's effects have values for.
@@ -123,29 +150,46 @@ fn caster(name: &str) -> Option<CasterKind> {
         .map(|(_, kind)| *kind)
 }
 
-/// Drives one run and keeps its rows.
-fn record(setup: &Setup, seed: u64, run: usize, laps: usize, log: bool) -> Result<(Drive, Rows), sim::Error> {
+/// Drives one run and keeps its rows, unless it is interrupted.
+fn record(
+    setup: &Setup,
+    seed: u64,
+    run: usize,
+    laps: usize,
+    log: bool,
+) -> Result<ControlFlow<Interrupted, (Drive, Rows)>, sim::Error> {
     let mut rows = Rows {
         log: log.then(Log::default),
         ..Rows::default()
     };
-    let drive = setup.drive(
-        Streams {
-            seed,
-            run: run as u64,
-        },
-        laps,
-        |step: &Step| {
-            rows.t_s.push(step.time_s);
-            rows.position_m.push(Some([step.observed.x, step.observed.y]));
-            if let Some(log) = &mut rows.log {
-                log.readings.push(step.readings);
-                log.left_m_s.push(step.command.left_m_s);
-                log.right_m_s.push(step.command.right_m_s);
-            }
-        },
-    )?;
-    Ok((drive, rows))
+    let streams = Streams {
+        seed,
+        run: run as u64,
+    };
+    let world = setup.scene.world(&setup.model, run)?;
+    let drive = sim::drive_until(&world, streams, None, laps, |step: &Step| {
+        rows.t_s.push(step.time_s);
+        rows.position_m.push(Some([step.observed.x, step.observed.y]));
+        if let Some(log) = &mut rows.log {
+            log.readings.push(step.readings);
+            log.left_m_s.push(step.command.left_m_s);
+            log.right_m_s.push(step.command.right_m_s);
+        }
+        interrupt::check().map_or_else(ControlFlow::Break, ControlFlow::Continue)
+    })?;
+    Ok(drive.map_continue(|drive| (drive, rows)))
+}
+
+/// What a run drove after its last lap kept, m, where it timed out or has none.
+fn rest(run: &SampledRun, rows: &Rows) -> Vec<[f64; 2]> {
+    if !run.timed_out && !run.laps.is_empty() {
+        return Vec::new();
+    }
+    let from_s = run.laps.last().map_or(0.0, |lap| lap.end_s);
+    let seen = rows.since_start_s().zip(&rows.position_m);
+    seen.filter(|(t_s, _)| *t_s >= from_s)
+        .filter_map(|(_, position_m)| *position_m)
+        .collect()
 }
 
 /// What an experimenter sets and a reader of the laps must know: the controller's settings and the driving direction.
@@ -236,12 +280,24 @@ fn text(args: &args::Drive, document: &Value) -> String {
             seconds(&run["lap_time_s"]),
             seconds(&run["lap_time_deviation_s"]),
             run["contact_steps"].to_string(),
-            if run["timed_out"] == true {
-                "timed out".into()
-            } else {
-                "closed".to_owned()
-            },
+            ending(run),
         ]);
     }
-    format!("{}\nwritten to {}\n", table.to_text(), args.out.display())
+    format!(
+        "{}\nwritten to {}, as {}\n",
+        table.to_text(),
+        args.out.display(),
+        document["data_set"].as_str().unwrap_or("")
+    )
+}
+
+/// How a run ended, and what became of laps that are not there.
+fn ending(run: &Value) -> String {
+    let missed = run["set_aside"].as_array().map_or(0, Vec::len);
+    match (run["timed_out"] == true, missed) {
+        (true, 0) => "timed out".into(),
+        (false, 0) => "closed".into(),
+        (true, _) => format!("timed out, {} missed a gate", counted(missed, "lap")),
+        (false, _) => format!("{} missed a gate", counted(missed, "lap")),
+    }
 }

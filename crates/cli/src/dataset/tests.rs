@@ -15,6 +15,12 @@ const DATASET: &str = "name = \"case\"\nworld = \"roduit2007\"\ncontroller = \"b
                        runs = [\"a\"]\nlaps = 3\nnote = \"by hand\"\n";
 const RUN: &str = "t_s,x_m,y_m\n0.000,1.2125,0.6720\n0.064,,\n";
 
+/// The text of a run's file.
+fn text(rows: &Rows) -> String {
+    let parts = run_csv(rows).unwrap();
+    String::from_utf8(parts.flatten().collect()).unwrap()
+}
+
 /// A data set in a folder of its own: `dataset.toml` and `run_a.csv`.
 fn folder(dataset: &str, run: &str) -> TempDir {
     let folder = TempDir::new().unwrap();
@@ -276,9 +282,8 @@ fn numbers_are_rounded_when_written() {
             right_m_s: vec![-0.123456, f64::NAN, 1e17],
         }),
     };
-    let text = String::from_utf8(run_csv(&rows).unwrap()).unwrap();
     assert_eq!(
-        text,
+        text(&rows),
         "t_s,x_m,y_m,ps0,ps1,ps2,ps3,ps4,ps5,ps6,ps7,left_m_s,right_m_s\n\
          0.000,1.2125,0.0000,0.0,0.1,4095.0,100.0,1.0,,0.0,7.3,0.05000,-0.12346\n\
          0.064,,,1.0,1.0,1.0,1.0,1.0,1.0,1.0,1.0,0.00000,\n\
@@ -300,7 +305,8 @@ fn what_is_written_is_read_back() {
             .collect(),
         log: None,
     };
-    let runs = [("a".to_owned(), rows(5)), ("aa".to_owned(), rows(7))];
+    let [five, seven] = [5, 7].map(rows);
+    let runs = [("a".to_owned(), &five), ("aa".to_owned(), &seven)];
     let set = DataSetToWrite {
         name: "of \"mine\"",
         world: "roduit2007",
@@ -333,7 +339,7 @@ proptest! {
             position_m: values.iter().map(|&(x, y)| Some([x, y])).collect(),
             log: None,
         };
-        let folder = folder(DATASET, std::str::from_utf8(&run_csv(&rows).unwrap()).unwrap());
+        let folder = folder(DATASET, &text(&rows));
         let read = DataSet::load(folder.path()).unwrap();
         for (read, written) in read.runs[0].rows.position_m.iter().zip(&rows.position_m) {
             let (read, written) = (read.unwrap(), written.unwrap());

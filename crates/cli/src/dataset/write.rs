@@ -1,6 +1,7 @@
 //! Data sets as they are written: numbers are rounded here and nowhere else.
 
-use std::fs;
+use std::fs::File;
+use std::io::Write;
 use std::path::Path;
 
 use anyhow::{Context, Result, ensure};
@@ -10,6 +11,7 @@ use toml::Table;
 use super::read::LOG_COLUMNS;
 use super::{DESCRIPTION, Rows};
 use crate::config::ControllerKind;
+use crate::interrupt;
 use crate::output::unwritable;
 
 const T_DECIMALS: usize = 3;
@@ -27,23 +29,29 @@ pub(crate) struct DataSetToWrite<'a> {
     pub(crate) note: &'a str,
     /// Keys of the model that were set otherwise, nested.
     pub(crate) declared: &'a Table,
-    pub(crate) runs: &'a [(String, Rows)],
+    pub(crate) runs: &'a [(String, &'a Rows)],
 }
 
 /// Writes `dataset.toml` and `run_<name>.csv` for each run into a folder that is there.
 ///
 /// # Errors
-/// Columns of a run that differ in length; a file that cannot be written.
+/// Columns of a run that differ in length; a file that cannot be written; Ctrl-C.
 pub(crate) fn write_dataset(dir: &Path, set: &DataSetToWrite<'_>) -> Result<()> {
-    let write = |name: &str, bytes: &[u8]| {
-        let path = dir.join(name);
-        fs::write(&path, bytes).map_err(|error| unwritable(&path, &error))
-    };
-    write(DESCRIPTION, dataset_toml(set).as_bytes())?;
+    write(&dir.join(DESCRIPTION), [dataset_toml(set).into_bytes()])?;
     set.runs.iter().try_for_each(|(name, rows)| {
         let text = run_csv(rows).with_context(|| format!("run {name}"))?;
-        write(&format!("run_{name}.csv"), &text)
+        write(&dir.join(format!("run_{name}.csv")), text)
     })
+}
+
+fn write(path: &Path, parts: impl IntoIterator<Item = Vec<u8>>) -> Result<()> {
+    let cannot = |error| unwritable(path, &error);
+    let mut file = File::create(path).map_err(cannot)?;
+    for part in parts {
+        interrupt::check()?;
+        file.write_all(&part).map_err(cannot)?;
+    }
+    Ok(())
 }
 
 /// The text of `dataset.toml`.
@@ -71,11 +79,13 @@ fn dataset_toml(set: &DataSetToWrite<'_>) -> String {
     .expect("strings, a number and a table have a form in TOML")
 }
 
-/// The text of `run_<name>.csv`: t with 3 decimals, x and y 4, readings 1, speeds 5.
+/// The text of `run_<name>.csv` in parts of so many rows that each is written in no time: t with 3 decimals, x and y 4,
+/// readings 1, speeds 5.
 ///
 /// # Errors
 /// Columns that differ in length.
-pub(super) fn run_csv(rows: &Rows) -> Result<Vec<u8>> {
+pub(super) fn run_csv(rows: &Rows) -> Result<impl Iterator<Item = Vec<u8>>> {
+    const PART: usize = 10_000;
     let count = rows.t_s.len();
     let lengths = [rows.position_m.len()].into_iter().chain(
         rows.log
@@ -86,15 +96,16 @@ pub(super) fn run_csv(rows: &Rows) -> Result<Vec<u8>> {
         lengths.into_iter().all(|length| length == count),
         "the columns of a run differ in length"
     );
-    let mut text = Vec::with_capacity(count * if rows.log.is_some() { 96 } else { 24 } + 100);
-    text.extend_from_slice(b"t_s,x_m,y_m");
-    for name in LOG_COLUMNS.iter().filter(|_| rows.log.is_some()) {
-        text.push(b',');
-        text.extend_from_slice(name.as_bytes());
-    }
-    text.push(b'\n');
-    (0..count).for_each(|index| push_row(&mut text, rows, index));
-    Ok(text)
+    let log = LOG_COLUMNS.iter().filter(|_| rows.log.is_some());
+    let header = log.fold("t_s,x_m,y_m".to_owned(), |header, name| header + "," + name) + "\n";
+    let part = move |first: usize| {
+        let part = first..count.min(first + PART);
+        let mut text = Vec::with_capacity(part.len() * if rows.log.is_some() { 96 } else { 24 });
+        part.for_each(|index| push_row(&mut text, rows, index));
+        text
+    };
+    let parts = (0..count).step_by(PART).map(part);
+    Ok(std::iter::once(header.into_bytes()).chain(parts))
 }
 
 fn push_row(text: &mut Vec<u8>, rows: &Rows, index: usize) {

@@ -6,7 +6,7 @@ use chart::{Axis, Color, Direction, Figure, Fill, Interval, Mark, Panel, Shape, 
 use super::Sweep;
 use super::analysis::{Clusters, SeedResult};
 use super::report::spread;
-use crate::figures::{MM, cluster_marks, modes_panel, single};
+use crate::figures::{MM, Scale, cluster_marks, modes_panel, single};
 use crate::laps::{SampledRun, mean_and_deviation};
 use crate::output::OutDir;
 
@@ -190,14 +190,24 @@ pub(super) fn modes(sweep: &Sweep, out: &OutDir) -> Result<Figure> {
             fill: Fill::Solid,
             ..Style::color(Color::GREY)
         };
-        marks.extend(cluster_marks(&clusters.project(cluster)?, "measured runs", style));
+        marks.extend(cluster_marks(
+            &clusters.project(cluster)?,
+            "measured runs",
+            style,
+            Scale::MM,
+        ));
     }
     let mut means = Vec::new();
     for (i, cluster) in clusters.points.iter().enumerate() {
         let Some(cluster) = cluster else { continue };
         let projection = clusters.project(cluster)?;
         if clusters.points.len() <= MOST_CLUSTERS {
-            marks.extend(cluster_marks(&projection, cluster.name(), Style::series(i)));
+            marks.extend(cluster_marks(
+                &projection,
+                cluster.name(),
+                Style::series(i),
+                Scale::MM,
+            ));
         } else {
             let mean = projection.mean();
             means.push([MM * mean[0], MM * mean[1]]);
@@ -213,6 +223,6 @@ pub(super) fn modes(sweep: &Sweep, out: &OutDir) -> Result<Figure> {
     Ok(single(
         "Point Distribution Model of the sweep",
         "Laps of the first seed in the plane of the first two modes, with ellipses of two standard deviations.",
-        modes_panel("", &clusters.pdm, marks),
+        modes_panel("", &clusters.pdm, marks, Scale::MM),
     ))
 }
