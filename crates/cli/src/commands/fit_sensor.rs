@@ -38,6 +38,7 @@ pub(crate) fn run(session: &Session, args: &FitSensor) -> Result<()> {
 /// The pairs, the names of their columns, and the file.
 fn read(args: &FitSensor) -> Result<(Vec<[f64; 2]>, [String; 2], Input)> {
     let mut file = CsvFile::open(&args.pairs)?;
+    file.check_names()?;
     let columns = match args.columns.as_deref() {
         None if file.header.len() < 2 => {
             return Err(file.header_error("two columns are needed: distance in m, and reading"));
