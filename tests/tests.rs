@@ -10,6 +10,7 @@ mod declared;
 mod determinism;
 mod effects_in_logs;
 mod errors;
+mod fit_sensor;
 #[path = "../benches/ground/mod.rs"]
 mod ground;
 mod iris;
