@@ -20,6 +20,11 @@ fn worlds_that_are_no_course() {
              [0.55675, 1.00435]",
         ),
         (
+            START,
+            "control_points = [[0,6, 1,0]",
+            "world.toml:19: [0.0, 6.0, 1.0, 0.0] has length 4; 2 is needed",
+        ),
+        (
             JOINT,
             "[[1.29205, 0.69005], [1.29780, 0.50010]",
             "world.toml:21: outer wall: spline 1 ends 0.005000 m away from where spline 2 starts; let spline 2 start at \
