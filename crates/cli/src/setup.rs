@@ -38,7 +38,7 @@ impl Setup {
         circuit: Arc<Circuit>,
         caster: Option<CasterKind>,
     ) -> Result<Self, sim::Error> {
-        let model = model(config, &circuit)?;
+        let model = model(config, &circuit.course)?;
         let scene = Scene::new(circuit, &model, caster)?;
         Ok(Self { model, scene })
     }
@@ -141,8 +141,8 @@ pub(crate) fn check(config: &Config) -> Result<(), sim::Error> {
 }
 
 /// The model that a configuration states.
-pub(crate) fn model(config: &Config, circuit: &Circuit) -> Result<Model, sim::Error> {
-    model_going(config, way(config, &circuit.course))
+pub(crate) fn model(config: &Config, course: &Course) -> Result<Model, sim::Error> {
+    model_going(config, way(config, course))
 }
 
 fn model_going(config: &Config, way: Way) -> Result<Model, sim::Error> {

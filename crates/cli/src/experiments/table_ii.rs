@@ -234,7 +234,10 @@ fn responses(study: &Study) -> Result<Vec<(&'static str, Response)>> {
             Variant::OriginalSensor => study.standard.with("sensor.kind", "original")?,
             _ => study.standard.clone(),
         };
-        Ok((name, setup::model(&config, study.circuit())?.machine.response))
+        Ok((
+            name,
+            setup::model(&config, &study.circuit().course)?.machine.response,
+        ))
     };
     Ok(vec![
         response(Variant::Standard, "improved model")?,
