@@ -53,6 +53,10 @@ fn bad_arguments_end_with_status_2() {
             "invalid float literal",
         ),
         (vec!["compare"], "<DATA>..."),
+        (
+            vec!["bench", "rays", "--segments", "15,0", "--out", "o"],
+            "0 is not in 1..",
+        ),
     ] {
         let ran = scratch.run(&args);
         assert_eq!((ran.status, ran.stdout.as_str()), (Some(2), ""), "{args:?}");
@@ -95,6 +99,17 @@ fn json_is_one_document_and_nothing_else() {
     let document = scratch.json(sweep.into_iter().chain(["--out", "sweep", "--json"]));
     assert_eq!(document["rows"].as_array().unwrap().len(), 4);
     assert!(matches!(scratch.json(["effects", "--json"]), Value::Array(effects) if !effects.is_empty()));
+}
+
+#[test]
+fn numbers_of_segments_that_come_out_equal_stand_once() {
+    let document = Scratch::new().json(["bench", "rays", "--segments", "1,2,15", "--json"]);
+    let rows = document["rows"].as_array().unwrap();
+    let segments: Vec<_> = rows.iter().map(|row| &row["segments"]).collect();
+    assert_eq!(segments, [6, 15]);
+    assert!(document["slopes"]["brute"]["exponent"].is_number());
+    let document = Scratch::new().json(["bench", "rays", "--segments", "1,2", "--json"]);
+    assert_eq!(document["slopes"], serde_json::json!({}));
 }
 
 #[test]

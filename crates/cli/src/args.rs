@@ -322,9 +322,10 @@ pub(crate) enum Bench {
             long,
             value_delimiter = ',',
             default_value = "15,33,47,105,1000,10000,100000",
-            value_name = "N,..."
+            value_name = "N,...",
+            value_parser = clap::value_parser!(u32).range(1..)
         )]
-        segments: Vec<usize>,
+        segments: Vec<u32>,
         /// Draws behind every interval of faithfulness
         #[arg(long, default_value_t = 20, value_name = "N", value_parser = clap::value_parser!(u32).range(2..))]
         seeds: u32,

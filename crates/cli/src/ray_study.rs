@@ -10,7 +10,8 @@ use chart::{Axis, Figure, Interval, Mark, Panel, Shape, Style};
 use pdm::Cluster;
 use rayon::prelude::*;
 use serde_json::{Value, json};
-use sim::{Caster, CasterKind, Circuit, Pose, Rays, Run, Streams, Vec2, Walls, max_error_for};
+use sim::{Caster, CasterKind, Circuit, Pose, Rays, Run, Streams, Vec2, Walls, max_error_for, segment_count};
+use track::Course;
 
 use crate::config::Config;
 use crate::experiments::{Block, Comparison, Estimate, Section};
@@ -49,7 +50,7 @@ fn casters() -> [(&'static str, Option<CasterKind>); 3] {
     ]
 }
 
-/// Measures casters against numbers of segments on a circuit; each tick is one of three casters at one number.
+/// Measures casters against numbers of segments on a circuit, numbers that come out equal once; each tick is one of three casters at one number.
 ///
 /// # Errors
 /// A number of segments that the circuit cannot be cut into.
@@ -80,7 +81,20 @@ pub(crate) fn measure(
         }
         Ok(row)
     };
-    segments.iter().map(row).collect()
+    cuts(&circuit.course, segments)?.into_iter().map(row).collect()
+}
+
+/// The maximal errors that give the numbers of segments nearest to these, each number once.
+fn cuts(course: &Course, segments: &[usize]) -> Result<Vec<f64>> {
+    let mut cuts: Vec<(usize, f64)> = Vec::new();
+    for &wanted in segments {
+        let max_error_m = max_error_for(course, wanted)?;
+        let found = segment_count(course, max_error_m)?;
+        if cuts.iter().all(|&(count, _)| count != found) {
+            cuts.push((found, max_error_m));
+        }
+    }
+    Ok(cuts.into_iter().map(|(_, max_error_m)| max_error_m).collect())
 }
 
 /// Poses of a robot that drives laps.
