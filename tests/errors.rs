@@ -250,6 +250,18 @@ fn models_with_keys_or_values_that_are_not_there() {
             "model.toml:2: effect.0.kind: one-sensor-gain without `gain` does nothing",
         ),
         (
+            "[[effect]]\nkind = \"reading-gain\"\ngain = \"big\"\n",
+            "model.toml:3: effect.0.gain: \"big\" given, a number expected",
+        ),
+        (
+            "[[effect]]\nkind = \"sensor-rotation\"\nangle_rad = 0.1\nangle_rad_per_s = 1e-4\n",
+            "model.toml:4: effect.0.angle_rad_per_s: is a change in time, which needs by = \"time\"",
+        ),
+        (
+            "[[effect]]\nkind = \"wheel-asymmetry\"\nby = \"run\"\nratio = []\n",
+            "model.toml:3: effect.0.by: by run needs an array with a value for each run",
+        ),
+        (
             "[sensor]\nrays = 100000000\n",
             "model.toml:2: sensor.rays = 100000000 is outside [1, 10000]",
         ),
