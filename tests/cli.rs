@@ -160,6 +160,19 @@ fn a_reader_that_closes_the_pipe_is_no_error() {
 }
 
 #[test]
+fn effects_are_listed_with_the_ranges_of_their_parameters() {
+    let said = Scratch::new().done(["effects"]).stdout;
+    for effect in [
+        "wheel-asymmetry (act)\n  the left wheel's speed times ratio\n    ratio [0.5, 2], neutral 1\n",
+        "    counts [0, 4000] counts, neutral 0\n    azimuth_rad [-6.283, 6.283] rad\n",
+        "    wall outer or inner\n    position [0, 1] fraction of the wall\n",
+    ] {
+        assert!(said.contains(effect), "{said}");
+    }
+    assert!(said.lines().all(|line| line.chars().count() <= 110), "{said}");
+}
+
+#[test]
 fn compare_names_runs_after_their_data_set() {
     let document = Scratch::new().json([
         "compare",
