@@ -25,9 +25,22 @@ fn every_command_teaches_itself() {
             overview.contains(&format!("  {command} ")),
             "{command} is not listed"
         );
-        let help = scratch.done([command, "--help"]).stdout;
-        assert!(help.contains("Usage: lapwing") && help.len() > 300, "{help}");
+        explains(&scratch, &[command]);
     }
+    for command in [["world", "check"], ["world", "segments"], ["bench", "rays"]] {
+        explains(&scratch, &command);
+    }
+}
+
+/// `lapwing help COMMAND` and `lapwing COMMAND --help` say the same, with an example.
+fn explains(scratch: &Scratch, command: &[&str]) {
+    let help = scratch.done([&["help"], command].concat()).stdout;
+    let example = format!("Example: lapwing {}", command.join(" "));
+    assert!(
+        help.contains(&example) && help.contains("Usage: lapwing"),
+        "{help}"
+    );
+    assert_eq!(scratch.done([command, &["--help"]].concat()).stdout, help);
 }
 
 #[test]
@@ -53,6 +66,10 @@ fn bad_arguments_end_with_status_2() {
             "invalid float literal",
         ),
         (vec!["compare"], "<DATA>..."),
+        (
+            vec!["bench", "rays", "--segments", "15,0", "--out", "o"],
+            "0 is not in 1..",
+        ),
     ] {
         let ran = scratch.run(&args);
         assert_eq!((ran.status, ran.stdout.as_str()), (Some(2), ""), "{args:?}");
@@ -98,6 +115,17 @@ fn json_is_one_document_and_nothing_else() {
 }
 
 #[test]
+fn numbers_of_segments_that_come_out_equal_stand_once() {
+    let document = Scratch::new().json(["bench", "rays", "--segments", "1,2,15", "--json"]);
+    let rows = document["rows"].as_array().unwrap();
+    let segments: Vec<_> = rows.iter().map(|row| &row["segments"]).collect();
+    assert_eq!(segments, [6, 15]);
+    assert!(document["slopes"]["brute"]["exponent"].is_number());
+    let document = Scratch::new().json(["bench", "rays", "--segments", "1,2", "--json"]);
+    assert_eq!(document["slopes"], serde_json::json!({}));
+}
+
+#[test]
 fn remarks_go_to_stderr_and_quiet_silences_them() {
     let scratch = Scratch::new();
     // With this sensor the rule-based robot sees walls everywhere and spins for ever.
@@ -129,6 +157,19 @@ fn remarks_go_to_stderr_and_quiet_silences_them() {
 }
 
 #[test]
+fn effects_are_listed_with_the_ranges_of_their_parameters() {
+    let said = Scratch::new().done(["effects"]).stdout;
+    for effect in [
+        "wheel-asymmetry (act)\n  the left wheel's speed times ratio\n    ratio [0.5, 2], neutral 1\n",
+        "    counts [0, 4000] counts, neutral 0\n    azimuth_rad [-6.283, 6.283] rad\n",
+        "    wall outer or inner\n    position [0, 1] fraction of the wall\n",
+    ] {
+        assert!(said.contains(effect), "{said}");
+    }
+    assert!(said.lines().all(|line| line.chars().count() <= 110), "{said}");
+}
+
+#[test]
 fn a_reader_that_closes_the_pipe_is_no_error() {
     let mut child = Scratch::new()
         .command(["effects"])
@@ -142,6 +183,19 @@ fn a_reader_that_closes_the_pipe_is_no_error() {
         (output.status.code(), output.stderr.as_slice()),
         (Some(0), b"".as_slice())
     );
+}
+
+#[test]
+fn what_a_report_says_is_well_set() {
+    let scratch = Scratch::new();
+    let ran = scratch.done(["reproduce", "--seeds", "2", "--no-trace", "--out", "report"]);
+    assert!(ran.stdout.contains("; 4 of 4 runs differ"), "{}", ran.stdout);
+    let report = scratch.read("report/report.html");
+    assert!(report.contains("lies beside this page as figures/rays_timing.svg"));
+    for text in [report, scratch.read("report/figures/rays_timing.svg")] {
+        let blanks = text.lines().find(|line| line.trim_start().contains("   "));
+        assert_eq!(blanks, None);
+    }
 }
 
 #[test]

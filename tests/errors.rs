@@ -20,6 +20,11 @@ fn worlds_that_are_no_course() {
              [0.55675, 1.00435]",
         ),
         (
+            START,
+            "control_points = [[0,6, 1,0]",
+            "world.toml:19: [0.0, 6.0, 1.0, 0.0] has length 4; 2 is needed",
+        ),
+        (
             JOINT,
             "[[1.29205, 0.69005], [1.29780, 0.50010]",
             "world.toml:21: outer wall: spline 1 ends 0.005000 m away from where spline 2 starts; let spline 2 start at \
@@ -128,6 +133,16 @@ fn corridors_too_narrow_for_the_robot() {
         &["drive", "roduit2007", "--world", "world.toml", "--out", "o"],
         &message,
     );
+    // The inner wall bulges to where it nearly touches the other, and gates cross there too.
+    let (straight, bulge) = (
+        "[0.29490, 0.64060], [0.29490, 0.70190]",
+        "[0.11, 0.64060], [0.11, 0.70190]",
+    );
+    scratch.write("world.toml", world_with(straight, bulge));
+    let message = format!(
+        "world.toml: the corridor is 0.0150 m wide at (0.111, 0.670), too narrow for a robot of 0.0740 m; {mend}"
+    );
+    scratch.refuses(&["world", "check", "world.toml", "--out", "o"], &message);
     scratch.write("model.toml", "[robot]\nbody_radius_m = 0.2\n");
     let message = format!(
         "the corridor is 0.1817 m wide at (0.570, 0.344), too narrow for a robot of 0.4000 m; {mend}"
@@ -141,6 +156,20 @@ fn corridors_too_narrow_for_the_robot() {
         &["drive", "roduit2007", "--set", set, "--out", "o"],
         &format!("--set {set}: {message}"),
     );
+}
+
+#[test]
+fn a_corridor_too_wide_for_its_walls_to_be_seen_is_remarked() {
+    let scratch = Scratch::new();
+    let world = scaled_world(10.0).replace("arena = [1.4, 1.2]", "arena = [14, 12]");
+    scratch.write("world.toml", world);
+    let ran = scratch.done(["world", "check", "world.toml"]);
+    assert_eq!(
+        ran.stderr,
+        "lapwing: world.toml: in the middle of the corridor no wall is near enough to be seen: it is 1.817 m wide at least, and \
+         the sensors see 0.1 m; lengths are in m\n"
+    );
+    assert_eq!(scratch.done(["world", "check", "roduit2007"]).stderr, "");
 }
 
 /// The shipped world with every coordinate of its walls times a factor.
@@ -219,6 +248,18 @@ fn models_with_keys_or_values_that_are_not_there() {
         (
             "[[effect]]\nkind = \"one-sensor-gain\"\nsensor = 2\n",
             "model.toml:2: effect.0.kind: one-sensor-gain without `gain` does nothing",
+        ),
+        (
+            "[[effect]]\nkind = \"reading-gain\"\ngain = \"big\"\n",
+            "model.toml:3: effect.0.gain: \"big\" given, a number expected",
+        ),
+        (
+            "[[effect]]\nkind = \"sensor-rotation\"\nangle_rad = 0.1\nangle_rad_per_s = 1e-4\n",
+            "model.toml:4: effect.0.angle_rad_per_s: is a change in time, which needs by = \"time\"",
+        ),
+        (
+            "[[effect]]\nkind = \"wheel-asymmetry\"\nby = \"run\"\nratio = []\n",
+            "model.toml:3: effect.0.by: by run needs an array with a value for each run",
         ),
         (
             "[sensor]\nrays = 100000000\n",

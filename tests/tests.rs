@@ -12,6 +12,7 @@ mod determinism;
 mod driving;
 mod effects_in_logs;
 mod errors;
+mod fit_sensor;
 #[path = "../benches/ground/mod.rs"]
 mod ground;
 mod iris;

@@ -61,6 +61,8 @@ fn pictures_are_written_where_they_are_asked_for() {
     for name in ["course/course.svg", "segments/segments.svg"] {
         assert!(scratch.read(name).starts_with("<svg "), "{name}");
     }
+    let course = scratch.read("course/course.svg");
+    assert!(course.contains(">gate 0<") && course.contains(">driving direction<"));
 }
 
 /// The shipped circuit in a mirror, where it is driven counter-clockwise.

@@ -73,13 +73,6 @@ pub(crate) fn joints(course: &Course) -> Mark {
 
 /// All gates, from wall to wall.
 pub(crate) fn gates(circuit: &Circuit) -> Mark {
-    let ends = |gate: &track::Gate| {
-        let (left, right) = (
-            gate.center + gate.left * gate.left_m,
-            gate.center - gate.left * gate.right_m,
-        );
-        [[left.x, left.y], [right.x, right.y]]
-    };
     let style = Style {
         width_px: 0.7,
         ..Style::color(Color::GREY)
@@ -87,8 +80,35 @@ pub(crate) fn gates(circuit: &Circuit) -> Mark {
     Mark::new(
         "gates",
         style,
-        Shape::Segments(circuit.gates.iter().map(ends).collect()),
+        Shape::Segments(circuit.gates.iter().map(across_corridor).collect()),
     )
+}
+
+/// A gate's ends at the walls.
+fn across_corridor(gate: &track::Gate) -> [[f64; 2]; 2] {
+    let (left, right) = (
+        gate.center + gate.left * gate.left_m,
+        gate.center - gate.left * gate.right_m,
+    );
+    [[left.x, left.y], [right.x, right.y]]
+}
+
+/// Gate 0, and an arrow from it in the driving direction.
+pub(crate) fn start(circuit: &Circuit) -> [Mark; 2] {
+    let gate = &circuit.gates[0];
+    let tip = gate.center + gate.forward() * (gate.left_m + gate.right_m);
+    let style = Style {
+        width_px: 2.5,
+        ..Style::color(Color::VERMILLION)
+    };
+    [
+        Mark::new("gate 0", style, Shape::Segments(vec![across_corridor(gate)])),
+        Mark::new(
+            "driving direction",
+            style,
+            Shape::Arrows(vec![[gate.center, tip].map(|p| [p.x, p.y])]),
+        ),
+    ]
 }
 
 /// Where a lap crosses the gates, m.

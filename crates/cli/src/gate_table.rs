@@ -30,10 +30,10 @@ impl GateTable {
     /// not a finite number; with file, line and column.
     pub(crate) fn load(path: &Path) -> Result<Self> {
         let mut file = CsvFile::open(path)?;
-        if looks_like_a_lap(&file.header) {
+        if file.starts_with_numbers() && !counts_up(&file.header) {
             return Err(file.header_error(
                 "these look like the numbers of a lap; a line with the names of the columns must \
-                 come first",
+                 come first: words, or numbers that count up by 1",
             ));
         }
         let columns = file.header.len();
@@ -86,10 +86,14 @@ pub(crate) fn file_names(clusters: &[Cluster]) -> Vec<String> {
     names
 }
 
-/// Columns may well be named by whole numbers, those of the gates, but not by fractions.
-fn looks_like_a_lap(header: &[String]) -> bool {
-    header.iter().all(|name| name.parse::<f64>().is_ok())
-        && header.iter().any(|name| name.parse::<i64>().is_err())
+/// Whether columns are named by whole numbers one after the other, those of the gates.
+fn counts_up(header: &[String]) -> bool {
+    let numbers: Option<Vec<i64>> = header.iter().map(|name| name.parse().ok()).collect();
+    numbers.is_some_and(|numbers| {
+        numbers
+            .windows(2)
+            .all(|pair| pair[1].checked_sub(pair[0]) == Some(1))
+    })
 }
 
 #[cfg(test)]
@@ -145,8 +149,13 @@ mod tests {
             ),
             (
                 "0.1,0.2\n0.3,0.4\n",
-                "laps.of.mine.csv:1: these look like the numbers of a lap; a line with the names of \
-                 the columns must come first",
+                "laps.of.mine.csv:1: these look like the numbers of a lap; a line with the names of the columns must \
+                 come first: words, or numbers that count up by 1",
+            ),
+            (
+                "-12,35,40\n-10,31,44\n",
+                "laps.of.mine.csv:1: these look like the numbers of a lap; a line with the names of the columns must \
+                 come first: words, or numbers that count up by 1",
             ),
             (
                 "a,b\n1,\n",

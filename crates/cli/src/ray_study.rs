@@ -10,7 +10,8 @@ use chart::{Axis, Figure, Interval, Mark, Panel, Shape, Style};
 use pdm::Cluster;
 use rayon::prelude::*;
 use serde_json::{Value, json};
-use sim::{Caster, CasterKind, Circuit, Pose, Rays, Run, Streams, Vec2, Walls, max_error_for};
+use sim::{Caster, CasterKind, Circuit, Pose, Rays, Run, Streams, Vec2, Walls, max_error_for, segment_count};
+use track::Course;
 
 use crate::config::Config;
 use crate::experiments::{Block, Comparison, Estimate, Section};
@@ -49,7 +50,7 @@ fn casters() -> [(&'static str, Option<CasterKind>); 3] {
     ]
 }
 
-/// Measures casters against numbers of segments on a circuit; each tick is one of three casters at one number.
+/// Measures casters against numbers of segments on a circuit, numbers that come out equal once; each tick is one of three casters at one number.
 ///
 /// # Errors
 /// A number of segments that the circuit cannot be cut into.
@@ -60,8 +61,7 @@ pub(crate) fn measure(
     tick: &dyn Fn(),
 ) -> Result<Vec<Row>> {
     let poses = driven_poses(config, circuit)?;
-    let row = |&wanted: &usize| {
-        let max_error_m = max_error_for(&circuit.course, wanted)?;
+    let row = |max_error_m: f64| {
         let mut config = config.clone();
         config.wall.max_error_m = max_error_m;
         let mut row = Row {
@@ -80,7 +80,20 @@ pub(crate) fn measure(
         }
         Ok(row)
     };
-    segments.iter().map(row).collect()
+    cuts(&circuit.course, segments)?.into_iter().map(row).collect()
+}
+
+/// The maximal errors that give the numbers of segments nearest to these, each number once.
+fn cuts(course: &Course, segments: &[usize]) -> Result<Vec<f64>> {
+    let mut cuts: Vec<(usize, f64)> = Vec::new();
+    for &wanted in segments {
+        let max_error_m = max_error_for(course, wanted)?;
+        let found = segment_count(course, max_error_m)?;
+        if cuts.iter().all(|&(count, _)| count != found) {
+            cuts.push((found, max_error_m));
+        }
+    }
+    Ok(cuts.into_iter().map(|(_, max_error_m)| max_error_m).collect())
 }
 
 /// Poses of a robot that drives laps.
@@ -404,8 +417,10 @@ pub(crate) fn ladder_table(rungs: &[Rung]) -> Table {
 pub(crate) fn figure(rows: &[Row], rungs: &[Rung]) -> Figure {
     Figure {
         title: "Cost of ray casting".into(),
-        description: "Left: nanoseconds for eight rays against the number of segments, for a plain loop, parry2d's BVH and                       lapwing. Right: distance to the measured laps against the cost of a control step."
-            .into(),
+        description:
+            "Left: nanoseconds for eight rays against the number of segments, for a plain loop, parry2d's BVH and lapwing. Right: \
+             distance to the measured laps against the cost of a control step."
+                .into(),
         panels: vec![cost_panel(rows), ladder_panel(rungs)],
         columns: 2,
         legend: chart::Side::Below,
@@ -426,16 +441,23 @@ pub(crate) fn section(rungs: &[Rung], draws: usize) -> Section {
         )
     });
     let text = format!(
-        "The paper trades the number of segments for computing time, because tracing rays costs a time linear in it. Below are          the cost of eight rays against the number of segments, for a plain loop, for a bounding volume hierarchy and for the          caster that lapwing chooses, and what finer walls buy: the distance of the simulated laps to the measured runs          (mean of eq. 8 over the runs; mean and middle 95 % of {draws} draws, each with a PDM of its own).{coarsest}"
+        "The paper trades the number of segments for computing time, because tracing rays costs a time linear in it. Below are \
+         the cost of eight rays against the number of segments, for a plain loop, for a bounding volume hierarchy and for the \
+         caster that lapwing chooses, and what finer walls buy: the distance of the simulated laps to the measured runs \
+         (mean of eq. 8 over the runs; mean and middle 95 % of {draws} draws, each with a PDM of its own).{coarsest}"
     );
-    let caption = "Fig. R. Left: cost of eight rays against the number of segments. Right: distance to the measured runs                    against the cost of a control step, for walls within the errors named. Measured on this machine when the                    report was made.";
+    let caption = format!(
+        "Fig. R. Left: cost of eight rays against the number of segments. Right: distance to the measured runs against the cost \
+         of a control step, for walls within the errors named. Measured on this machine when the report was made; the picture \
+         lies beside this page as {PICTURE}, since all that stands in the page itself is the same whenever it is made."
+    );
     Section {
         heading: "What ray casting costs".into(),
         blocks: vec![
             Block::Text(text),
             Block::Linked {
                 path: PICTURE.into(),
-                caption: caption.into(),
+                caption,
             },
             Block::Table(ladder_table(rungs)),
         ],

@@ -36,7 +36,7 @@ impl Setup {
         circuit: Arc<Circuit>,
         caster: Option<CasterKind>,
     ) -> Result<Self, sim::Error> {
-        let model = model(config, &circuit)?;
+        let model = model(config, &circuit.course)?;
         let scene = Scene::new(circuit, &model, caster)?;
         Ok(Self { model, scene })
     }
@@ -136,8 +136,8 @@ pub(crate) fn check(config: &Config) -> Result<(), sim::Error> {
 }
 
 /// The model that a configuration states.
-pub(crate) fn model(config: &Config, circuit: &Circuit) -> Result<Model, sim::Error> {
-    model_going(config, way(config, &circuit.course))
+pub(crate) fn model(config: &Config, course: &Course) -> Result<Model, sim::Error> {
+    model_going(config, way(config, course))
 }
 
 fn model_going(config: &Config, way: Way) -> Result<Model, sim::Error> {
@@ -248,6 +248,12 @@ fn setting(index: usize, effect: &config::Effect) -> Result<Setting, sim::Error>
     let by_time = effect.by == Some(config::Pattern::Time);
     let slope_key = |param: &sim::Param| format!("{}_per_s", param.name);
     for key in effect.parameters.keys() {
+        if !by_time && spec.params.iter().any(|p| slope_key(p) == *key) {
+            return Err(invalid(
+                key,
+                "is a change in time, which needs by = \"time\"".into(),
+            ));
+        }
         let known = |p: &sim::Param| p.name == key || by_time && slope_key(p) == *key;
         // A list has no pattern.
         let list = spec.list.iter().filter(|_| effect.by.is_none());
@@ -314,7 +320,8 @@ fn setting(index: usize, effect: &config::Effect) -> Result<Setting, sim::Error>
             let lengths = given.iter().filter_map(|v| v.as_array().map(Vec::len));
             let runs = lengths
                 .max()
-                .ok_or_else(|| invalid("by", "by run needs an array of values".into()))?;
+                .filter(|&runs| runs > 0)
+                .ok_or_else(|| invalid("by", "by run needs an array with a value for each run".into()))?;
             let of_run = |run: usize| -> Result<Vec<f64>, sim::Error> {
                 spec.params
                     .iter()
@@ -337,7 +344,7 @@ fn setting(index: usize, effect: &config::Effect) -> Result<Setting, sim::Error>
 /// A parameter's value as the number that the simulator takes, or what was expected.
 fn number(param: &sim::Param, value: &Value) -> Result<f64, String> {
     match value {
-        Value::String(word) => param
+        Value::String(word) if !param.choices.is_empty() => param
             .choices
             .iter()
             .position(|choice| choice == word)

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-/// A column with a cell of more characters than this is broken into lines.
+/// A column with a cell of more characters than this holds prose: it stands to the left, and a page breaks it into lines.
 const PROSE: usize = 40;
 
 /// Named columns and rows of words.
@@ -27,7 +27,7 @@ impl Table {
         self.rows.push(row.into_iter().map(Into::into).collect());
     }
 
-    /// For a terminal: the first column to the left, the others to the right.
+    /// For a terminal: the first column and prose to the left, the others to the right.
     pub(crate) fn to_text(&self) -> String {
         let width = |i: usize| {
             let cells = self.rows.iter().filter_map(|row| row.get(i));
@@ -38,9 +38,10 @@ impl Table {
                 .unwrap_or(0)
         };
         let widths: Vec<usize> = (0..self.columns.len()).map(width).collect();
+        let prose = self.prose();
         let line = |cells: &[String]| {
             let padded = cells.iter().zip(&widths).enumerate().map(|(i, (cell, &width))| {
-                if i == 0 {
+                if i == 0 || prose[i] {
                     format!("{cell:<width$}")
                 } else {
                     format!("{cell:>width$}")
@@ -64,6 +65,15 @@ impl Table {
         text
     }
 
+    /// Of each column whether it holds prose.
+    fn prose(&self) -> Vec<bool> {
+        let is_prose = |column: usize| {
+            let mut cells = self.rows.iter().filter_map(|row| row.get(column));
+            cells.any(|cell| cell.chars().count() > PROSE)
+        };
+        (0..self.columns.len()).map(is_prose).collect()
+    }
+
     /// As CSV; cells with a comma or a quotation mark are quoted.
     pub(crate) fn to_csv(&self) -> String {
         let cell = |cell: &String| match cell.contains([',', '"', '\n']) {
@@ -79,11 +89,7 @@ impl Table {
 
     /// As an HTML table; the title is its caption.
     pub(crate) fn to_html(&self) -> String {
-        let is_prose = |column: usize| {
-            let mut cells = self.rows.iter().filter_map(|row| row.get(column));
-            cells.any(|cell| cell.chars().count() > PROSE)
-        };
-        let prose: Vec<bool> = (0..self.columns.len()).map(is_prose).collect();
+        let prose = self.prose();
         let cells = |tag: &str, row: &[String]| {
             let cell = |(cell, prose): (&String, &bool)| {
                 let class = if *prose { " class=\"prose\"" } else { "" };

@@ -1,5 +1,23 @@
 //! Why something cannot be fitted.
 
+/// Where from the pairs that there are others are missing.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Toward {
+    /// At smaller distances.
+    Nearer,
+    /// At larger ones.
+    Farther,
+}
+
+impl std::fmt::Display for Toward {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Nearer => "nearer than",
+            Self::Farther => "farther than",
+        })
+    }
+}
+
 /// Why something cannot be fitted.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -24,11 +42,22 @@ pub enum Error {
         /// Different distances.
         distances: usize,
     },
-    /// Pairs that every response of the family fits alike.
+    /// Readings that do not fall with the distance.
     #[error(
-        "the pairs do not determine a, d0 and p: measure below and above the distance where the reading falls to half"
+        "the readings do not fall as the distance grows; measure farther away too, and look whether the first column holds the \
+         distances and the second the readings, or name them with --columns"
     )]
-    Undetermined,
+    NotFalling,
+    /// Pairs that responses far apart fit alike.
+    #[error("the pairs do not determine {parameter}; measure more of them {toward} {from_m} m")]
+    Undetermined {
+        /// The number that they leave open most.
+        parameter: &'static str,
+        /// Where pairs are missing.
+        toward: Toward,
+        /// Seen from this distance, m.
+        from_m: f64,
+    },
     /// Laps that the declared model cannot complete.
     #[error(
         "the declared model does not complete its laps: nothing can be traced from it; look at `lapwing drive` with the same settings"

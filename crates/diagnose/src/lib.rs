@@ -18,7 +18,7 @@ pub use answer::{ALTERNATIVE, Answer, Cause, Explanation, Verdict};
 pub use candidate::Candidate;
 pub use corners::{Corners, other_cuts};
 pub use detectable::Detectable;
-pub use error::Error;
+pub use error::{Error, Toward};
 pub use laps::{
     Atlas, Baselines, Beginning, Departures, Extent, LapDiagnosis, MeanBeginning, ObservedLap, ObservedRun,
     Quadratic, Rival, Simulate, Unseen, separations,

@@ -4,8 +4,13 @@ use nalgebra::{DMatrix, DVector};
 use sim::Response;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
-use crate::Error;
+use crate::error::{Error, Toward};
 use crate::least_squares::{Minimum, minimise};
+
+/// Largest standard error of a logarithm: the number is known within a factor of e.
+const LOOSEST: f64 = 1.0;
+/// How many times nearer than the nearest pair, or farther than the farthest, d0 may lie.
+const REACH: f64 = 10.0;
 
 /// A number with its standard error.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -43,8 +48,8 @@ impl ResponseFit {
     /// The fit to pairs of (distance m, reading counts).
     ///
     /// # Errors
-    /// Fewer than five pairs with positive readings at three or more distances, a negative distance, or pairs that do
-    /// not determine the three numbers.
+    /// Fewer than five pairs with positive readings at three or more distances, a negative distance, readings that do not
+    /// fall with distance, or pairs that do not determine the three numbers.
     pub fn new(pairs: &[[f64; 2]]) -> Result<Self, Error> {
         if let Some(bad) = pairs
             .iter()
@@ -65,15 +70,18 @@ impl ResponseFit {
                 distances: distances.len(),
             });
         }
-        let minimum = fit(&used).ok_or(Error::Undetermined)?;
-        let covariance = minimum.covariance.as_ref().ok_or(Error::Undetermined)?;
+        if !falling(&used) {
+            return Err(Error::NotFalling);
+        }
+        let minimum = fit(&used);
         let freedom = (used.len() - 3) as f64;
         let residual_log = (minimum.squares / freedom).sqrt();
+        let log_errors = log_errors(&used, &minimum, residual_log)?;
         let t95 = StudentsT::new(0.0, 1.0, freedom).map_or(f64::NAN, |t| t.inverse_cdf(0.975));
         let estimate = |i: usize| {
             // Of the logarithm's error to first order.
             let value = minimum.parameters[i].exp();
-            let standard_error = value * residual_log * covariance[(i, i)].sqrt();
+            let standard_error = value * log_errors[i];
             Estimate {
                 value,
                 standard_error,
@@ -88,8 +96,7 @@ impl ResponseFit {
                 .filter(|(j, _)| *j != i)
                 .map(|(_, p)| *p)
                 .collect();
-            let other = fit(&others).ok_or(Error::Undetermined)?;
-            Ok(self::response(&other.parameters).reading(used[i][0]) / used[i][1] - 1.0)
+            self::response(&fit(&others).parameters).reading(used[i][0]) / used[i][1] - 1.0
         };
         Ok(Self {
             a_counts: estimate(0),
@@ -97,7 +104,7 @@ impl ResponseFit {
             exponent: estimate(2),
             residual_log,
             relative_residuals: used.iter().map(|p| p[1] / response.reading(p[0]) - 1.0).collect(),
-            left_out: (0..used.len()).map(left_out).collect::<Result<_, Error>>()?,
+            left_out: (0..used.len()).map(left_out).collect(),
             set_aside: pairs.len() - used.len(),
             pairs: used,
         })
@@ -127,8 +134,55 @@ fn response(log_parameters: &DVector<f64>) -> Response {
     }
 }
 
+/// Whether readings fall with distance, by the slope of their logarithms.
+fn falling(pairs: &[[f64; 2]]) -> bool {
+    let mean_m = pairs.iter().map(|p| p[0]).sum::<f64>() / pairs.len() as f64;
+    let first = pairs[0][1]; // by ratios, so that equal readings have a slope of exactly 0
+    let moment = |p: &[f64; 2]| (p[0] - mean_m) * (p[1] / first).ln();
+    pairs.iter().map(moment).sum::<f64>() < 0.0
+}
+
+/// Standard errors of log a, log d0 and log p.
+///
+/// # Errors
+/// One of them above [`LOOSEST`], or a d0 beyond the [`REACH`] of the pairs.
+fn log_errors(pairs: &[[f64; 2]], minimum: &Minimum, residual_log: f64) -> Result<[f64; 3], Error> {
+    let errors = minimum
+        .covariance
+        .as_ref()
+        .map_or([f64::INFINITY; 3], |covariance| {
+            [0, 1, 2].map(|i| residual_log * covariance[(i, i)].sqrt())
+        });
+    let distances = pairs.iter().map(|p| p[0]).filter(|&d| d > 0.0);
+    let (nearest, farthest) = distances.fold((f64::INFINITY, 0.0_f64), |(near, far), d| {
+        (near.min(d), far.max(d))
+    });
+    let d0 = minimum.parameters[1].exp();
+    let in_reach = (nearest / REACH..=farthest * REACH).contains(&d0);
+    if in_reach && errors.iter().all(|&error| error <= LOOSEST) {
+        return Ok(errors);
+    }
+    let loosest = ["a", "d0", "p"]
+        .into_iter()
+        .zip(errors)
+        .max_by(|x, y| x.1.total_cmp(&y.1));
+    // Far away readings fall at least as 1 / d; where they fall less the pairs are those of the near part.
+    let (middle, p) = ((nearest * farthest).sqrt(), minimum.parameters[2].exp());
+    let steepness = p / (1.0 + (d0 / middle).powf(p));
+    let (toward, from_m) = if steepness > 1.0 {
+        (Toward::Nearer, nearest)
+    } else {
+        (Toward::Farther, farthest)
+    };
+    Err(Error::Undetermined {
+        parameter: loosest.filter(|_| in_reach).map_or("d0", |(name, _)| name),
+        toward,
+        from_m,
+    })
+}
+
 /// The best of several descents over (log a, log d0, log p): far from the knee the surface has flat arms.
-fn fit(pairs: &[[f64; 2]]) -> Option<Minimum> {
+fn fit(pairs: &[[f64; 2]]) -> Minimum {
     let largest = pairs.iter().map(|p| p[1]).fold(f64::MIN, f64::max);
     let farthest = pairs.iter().map(|p| p[0]).fold(f64::MIN, f64::max);
     let starts = [0.01, 0.05, 0.2, 0.6]
@@ -139,8 +193,8 @@ fn fit(pairs: &[[f64; 2]]) -> Option<Minimum> {
             let start = DVector::from_vec(vec![largest.ln(), d0.ln(), p.ln()]);
             minimise(start, |parameters| residuals(pairs, parameters))
         })
-        .filter(|minimum| minimum.squares.is_finite())
         .min_by(|a, b| a.squares.total_cmp(&b.squares))
+        .expect("there are starts")
 }
 
 /// log a - log(1 + (d / d0)^p) - log reading, and its derivatives.
@@ -228,5 +282,35 @@ mod tests {
         assert!(matches!(ResponseFit::new(&pairs), Err(Error::Pair { .. })));
         pairs[3][1] = 0.0;
         assert_eq!(ResponseFit::new(&pairs).unwrap().set_aside, 1);
+    }
+
+    #[test]
+    fn pairs_that_leave_the_response_open_are_refused() {
+        let refusal = |reading: &dyn Fn(f64) -> f64| {
+            let pairs: Vec<[f64; 2]> = (1..=8)
+                .map(|i| f64::from(i) * 0.01)
+                .map(|d| [d, reading(d)])
+                .collect();
+            ResponseFit::new(&pairs).unwrap_err()
+        };
+        assert_eq!(refusal(&|_| 100.0), Error::NotFalling);
+        assert_eq!(refusal(&|d| 1e4 * d), Error::NotFalling);
+        let nearer = Error::Undetermined {
+            parameter: "d0",
+            toward: Toward::Nearer,
+            from_m: 0.01,
+        };
+        assert_eq!(refusal(&|d| 0.5 * d.powf(-1.5)), nearer);
+        // Far below the distance where the reading has halved.
+        let farther = Error::Undetermined {
+            parameter: "d0",
+            toward: Toward::Farther,
+            from_m: 0.08,
+        };
+        let scattered = |d: f64| 1.0 + 0.01 * (1e4 * d).sin();
+        assert_eq!(
+            refusal(&|d| 1e3 * scattered(d) / (1.0 + (d / 0.5).powi(2))),
+            farther
+        );
     }
 }

@@ -1,6 +1,6 @@
 //! The declared model: every number that a simulation needs beside the course.
 
-use track::Way;
+use track::{Course, Way};
 
 use crate::effects::Setting;
 use crate::sensor::check;
@@ -156,6 +156,26 @@ impl Model {
             .iter()
             .enumerate()
             .try_for_each(|(i, setting)| setting.check(i))
+    }
+
+    /// Nothing, if the robot fits between the walls of a course.
+    ///
+    /// # Errors
+    /// A corridor that is too narrow, and where.
+    pub fn check_fits(&self, course: &Course) -> Result<(), Error> {
+        let corridor = course.corridor_m();
+        let body_m = 2.0 * self.machine.robot.body_radius_m;
+        let narrowest_m = corridor.narrowest_m - self.wall.thickness_m;
+        if narrowest_m <= body_m {
+            let at = corridor.narrowest_at;
+            return Err(Error::TooNarrow {
+                narrowest_m,
+                x_m: at.x,
+                y_m: at.y,
+                body_m,
+            });
+        }
+        Ok(())
     }
 }
 

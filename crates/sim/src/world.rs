@@ -107,18 +107,7 @@ impl Scene {
     /// A model out of range, walls that cannot be cut, a corridor too narrow for the robot.
     pub fn new(circuit: Arc<Circuit>, model: &Model, caster: Option<CasterKind>) -> Result<Self, Error> {
         model.check()?;
-        let corridor = circuit.course.corridor_m();
-        let body_m = 2.0 * model.machine.robot.body_radius_m;
-        let narrowest_m = corridor.narrowest_m - model.wall.thickness_m;
-        if narrowest_m <= body_m {
-            let at = corridor.narrowest_at;
-            return Err(Error::TooNarrow {
-                narrowest_m,
-                x_m: at.x,
-                y_m: at.y,
-                body_m,
-            });
-        }
+        model.check_fits(&circuit.course)?;
         let outer = circuit.course.outer.flatten(model.wall.max_error_m)?;
         let inner = circuit.course.inner.flatten(model.wall.max_error_m)?;
         let walls = Walls::new(&outer, &inner, model.wall.thickness_m);

@@ -109,7 +109,7 @@ impl Course {
         let [outer, inner] = file.walls(text)?;
         Self::new(
             &file.name,
-            *file.arena.get_ref(),
+            file.arena.get_ref().0,
             *file.direction.get_ref(),
             outer,
             inner,
@@ -261,7 +261,7 @@ fn encloses(line: &[Segment], p: Vec2) -> bool {
 #[serde(deny_unknown_fields)]
 struct WorldFile {
     name: String,
-    arena: Spanned<[f64; 2]>,
+    arena: Spanned<Pair>,
     direction: Spanned<Direction>,
     wall: Vec<WallEntry>,
 }
@@ -322,7 +322,21 @@ struct WallEntry {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct SplineEntry {
-    control_points: Spanned<Vec<[f64; 2]>>,
+    control_points: Spanned<Vec<Pair>>,
+}
+
+/// Exactly two numbers; an array of two would be read from more.
+#[derive(Deserialize)]
+#[serde(try_from = "Vec<f64>")]
+struct Pair([f64; 2]);
+
+impl TryFrom<Vec<f64>> for Pair {
+    type Error = String;
+
+    fn try_from(numbers: Vec<f64>) -> Result<Self, String> {
+        let pair = numbers.try_into().map(Self);
+        pair.map_err(|numbers: Vec<f64>| format!("{numbers:?} has length {}; 2 is needed", numbers.len()))
+    }
 }
 
 impl WallEntry {
@@ -330,7 +344,7 @@ impl WallEntry {
         let start_of = |entry: &SplineEntry| entry.control_points.span().start;
         let spline = |entry: &SplineEntry| {
             let points = entry.control_points.get_ref().iter();
-            Spline::new(points.map(|&[x, y]| Vec2::new(x, y)).collect())
+            Spline::new(points.map(|&Pair([x, y])| Vec2::new(x, y)).collect())
                 .map_err(|what| at(text, Some(start_of(entry)), what))
         };
         let splines = self.spline.iter().map(spline).collect::<Result<_, _>>()?;
@@ -407,6 +421,12 @@ mod tests {
         let mend = "let spline 2 start at [1.29205, 0.69505]";
         let gap = "outer wall: spline 1 ends 0.010000 m away from where spline 2 starts";
         assert_eq!(message, format!("line {points}: {gap}; {mend}"));
+        let message = refusal("[[1.29205, 0.69505]", "[[1.29205, 0.69505, 0.1]");
+        let numbers = "[1.29205, 0.69505, 0.1] has length 3; 2 is needed";
+        assert_eq!(message, format!("line {points}: {numbers}"));
+        let message = refusal("arena = [1.4, 1.2]", "arena = [1.4]");
+        let arena = line("arena =");
+        assert_eq!(message, format!("line {arena}: [1.4] has length 1; 2 is needed"));
         let message = refusal("[[1.29205", "[[nan");
         assert_eq!(
             message,

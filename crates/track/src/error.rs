@@ -185,7 +185,8 @@ pub enum Error {
     },
     /// Two gates cross, so that no order of crossing would be right.
     #[error(
-        "gates {first} and {second} of {of} cross; take fewer gates, or widen the bend of the walls there"
+        "gates {first} and {second} of {of} cross near [{:.4}, {:.4}]; widen the bend of the walls there, or set run.gates lower",
+        at_m.x, at_m.y
     )]
     GatesCross {
         /// The one with the lower number.
@@ -194,6 +195,8 @@ pub enum Error {
         second: usize,
         /// Number of gates.
         of: usize,
+        /// Where.
+        at_m: Vec2,
     },
     /// A lap without a position at one of the gates.
     #[error("lap misses gate {gate} of {of}")]

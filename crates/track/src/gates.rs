@@ -166,10 +166,11 @@ fn check(gates: &[Gate]) -> Result<(), Error> {
     }
     let segments: Vec<Segment> = gates.iter().map(Gate::segment).collect();
     match crossing(&segments, |_, _| true) {
-        Some((first, second, _)) => Err(Error::GatesCross {
+        Some((first, second, at_m)) => Err(Error::GatesCross {
             first,
             second,
             of: count,
+            at_m,
         }),
         None => Ok(()),
     }
@@ -266,7 +267,7 @@ mod tests {
         // the sharpest bends of the midline have their centre inside the corridor
         let message = circuit().gates(200).unwrap_err().to_string();
         assert!(
-            message.starts_with("gates 181 and 182 of 200 cross; take fewer gates"),
+            message.starts_with("gates 181 and 182 of 200 cross near ["),
             "{message}"
         );
     }

@@ -19,10 +19,11 @@ pub(crate) fn run(session: &Session, args: &Bench) -> Result<()> {
         json,
         out,
     } = args;
+    let segments: Vec<usize> = segments.iter().map(|&n| n as usize).collect();
     let measured = Measurements::load(&[])?;
     let config = measured.standard()?;
     let progress = session.progress("casting rays", 3 * segments.len() as u64);
-    let rows = ray_study::measure(&config, &measured.circuit, segments, &|| progress.tick(1))?;
+    let rows = ray_study::measure(&config, &measured.circuit, &segments, &|| progress.tick(1))?;
     drop(progress);
     if *json && out.is_none() {
         return session.print_json(&ray_study::document(&rows, &[]));

@@ -2,11 +2,11 @@
 
 use anyhow::Result;
 use serde_json::{Value, json};
-use sim::{EFFECTS, Param};
+use sim::{EFFECTS, Param, Spec};
 
 use crate::args::Effects;
 use crate::session::Session;
-use crate::table::Table;
+use crate::table::four_digits;
 
 pub(crate) fn run(session: &Session, args: &Effects) -> Result<()> {
     if args.json {
@@ -20,16 +20,40 @@ pub(crate) fn run(session: &Session, args: &Effects) -> Result<()> {
         });
         return session.print_json(&effects.collect());
     }
-    let mut table = Table::new("", &["effect", "stage", "parameters [neutral]", "what it does"]);
-    for spec in EFFECTS {
-        let parameter = |param: &Param| match param.neutral {
-            Some(neutral) => format!("{} [{neutral}]", param.name),
-            None => param.name.to_owned(),
-        };
-        let parameters: Vec<String> = spec.params.iter().map(parameter).collect();
-        table.push([spec.name, spec.stage.name(), &parameters.join(", "), spec.summary]);
+    session.print(&EFFECTS.iter().map(text).collect::<String>())
+}
+
+/// An effect's name and stage, what it does, and its parameters, a line each.
+fn text(spec: &Spec) -> String {
+    let parameters = spec
+        .params
+        .iter()
+        .map(|param| format!("    {}\n", in_words(param)));
+    let (name, stage, summary) = (spec.name, spec.stage.name(), spec.summary);
+    format!(
+        "{name} ({stage})\n  {summary}\n{}",
+        parameters.collect::<String>()
+    )
+}
+
+/// A parameter with its range and unit, or its choices, and the value at which it changes nothing.
+fn in_words(param: &Param) -> String {
+    let mut text = match param.choices {
+        [] => format!(
+            "{} [{}, {}]",
+            param.name,
+            four_digits(param.low),
+            four_digits(param.high)
+        ),
+        choices => format!("{} {}", param.name, choices.join(" or ")),
+    };
+    if !param.unit.is_empty() {
+        text += &format!(" {}", param.unit);
     }
-    session.print(&table.to_text())
+    if let Some(neutral) = param.neutral {
+        text += &format!(", neutral {neutral}");
+    }
+    text
 }
 
 fn parameter(param: &Param) -> Value {

@@ -13,9 +13,21 @@ use crate::output::{Input, OutDir, Work};
 use crate::session::Session;
 use crate::table::Table;
 
+/// No infra-red sensor of a robot sees a wall from here: larger distances are in another unit, or are readings.
+const FARTHEST_M: f64 = 10.0;
+/// Few see one from here.
+const FAR_M: f64 = 1.0;
+
 pub(crate) fn run(session: &Session, args: &FitSensor) -> Result<()> {
     let (pairs, names, input) = read(args)?;
     let fit = ResponseFit::new(&pairs).with_context(|| args.pairs.display().to_string())?;
+    let farthest_m = fit.pairs.iter().map(|p| p[0]).fold(0.0, f64::max);
+    if farthest_m > FAR_M {
+        session.remark(&format!(
+            "{}: distances up to {farthest_m} m are taken to be in m; few infra-red sensors see so far",
+            args.pairs.display()
+        ));
+    }
     if let Some(out) = &args.out {
         let configuration = json!({ "pairs": args.pairs, "columns": names });
         let out = OutDir::create(
@@ -38,6 +50,7 @@ pub(crate) fn run(session: &Session, args: &FitSensor) -> Result<()> {
 /// The pairs, the names of their columns, and the file.
 fn read(args: &FitSensor) -> Result<(Vec<[f64; 2]>, [String; 2], Input)> {
     let mut file = CsvFile::open(&args.pairs)?;
+    file.check_names()?;
     let columns = match args.columns.as_deref() {
         None if file.header.len() < 2 => {
             return Err(file.header_error("two columns are needed: distance in m, and reading"));
@@ -59,6 +72,13 @@ fn read(args: &FitSensor) -> Result<(Vec<[f64; 2]>, [String; 2], Input)> {
             return Err(row.field_error(
                 columns[0],
                 format!("{} m is no distance; it must not be negative", pair[0]),
+            ));
+        }
+        if pair[0] > FARTHEST_M {
+            let mend = "give distances in m, in the first column or in the one that --columns names first";
+            return Err(row.field_error(
+                columns[0],
+                format!("at {} m an infra-red sensor sees no wall; {mend}", pair[0]),
             ));
         }
         pairs.push(pair);
@@ -134,7 +154,24 @@ fn text(fit: &ResponseFit) -> String {
             fit.set_aside
         );
     }
-    text
+    text + &format!("\nin a model: {}\n", settings(fit))
+}
+
+/// What sets the response in a model, to six significant digits.
+fn settings(fit: &ResponseFit) -> String {
+    let setting = |(key, estimate): (&str, &Estimate)| {
+        let rounded: f64 = format!("{:.5e}", estimate.value)
+            .parse()
+            .unwrap_or(estimate.value);
+        format!("--set sensor.improved.{key}={rounded}")
+    };
+    [
+        ("a_counts", &fit.a_counts),
+        ("d0_m", &fit.d0_m),
+        ("exponent", &fit.exponent),
+    ]
+    .map(setting)
+    .join(" ")
 }
 
 fn figure(fit: &ResponseFit, names: &[String; 2]) -> Figure {

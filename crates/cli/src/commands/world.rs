@@ -1,19 +1,21 @@
 //! `lapwing world`: check a world, cut its walls.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use anyhow::{Context, Result};
 use chart::{Axis, Color, Dash, Figure, Mark, Panel, Shape, Style};
 use serde_json::{Value, json};
+use sim::{Circuit, Scene};
 use track::{Course, Side};
 
 use crate::args::World;
 use crate::config::{Config, WorldSource, world_source};
-use crate::figures::{MM, gates, joints, map, single, walls};
+use crate::figures::{MM, gates, joints, map, single, start, walls};
 use crate::output::{OutDir, Work};
 use crate::session::Session;
 use crate::setup;
-use crate::table::Table;
+use crate::table::{Table, four_digits};
 
 pub(crate) fn run(session: &Session, args: &World) -> Result<()> {
     match args {
@@ -36,13 +38,24 @@ fn source(world: &Path) -> Result<WorldSource> {
 }
 
 fn check(session: &Session, source: &WorldSource, json: bool, out: Option<&Path>) -> Result<()> {
-    let config = Config::shipped();
-    let circuit = setup::circuit(source, config.run.gates)?;
-    let model = setup::model(&config, &circuit)?;
-    let scene = sim::Scene::new(std::sync::Arc::clone(&circuit), &model, None);
-    scene.with_context(|| source.label.clone())?; // the robot fits
+    let (config, course) = (Config::shipped(), setup::course(source)?);
+    let model = setup::model(&config, &course)?;
+    let label = || source.label.clone();
+    model.check_fits(&course).with_context(label)?;
+    let circuit = Arc::new(Circuit::new(course, config.run.gates).with_context(label)?);
+    Scene::new(Arc::clone(&circuit), &model, None).with_context(label)?; // the walls can be cut
     let course = &circuit.course;
     let corridor = course.corridor_m();
+    let sight_m = model.machine.robot.body_radius_m + model.machine.range_m;
+    if corridor.narrowest_m > 2.0 * sight_m {
+        session.remark(&format!(
+            "{}: in the middle of the corridor no wall is near enough to be seen: it is {} m wide at least, and the sensors \
+             see {} m; lengths are in m",
+            source.label,
+            four_digits(corridor.narrowest_m),
+            model.machine.range_m
+        ));
+    }
     if let Some(out) = out {
         let folder = OutDir::create(
             out,
@@ -50,10 +63,16 @@ fn check(session: &Session, source: &WorldSource, json: bool, out: Option<&Path>
             std::slice::from_ref(&source.input),
             false,
         )?;
-        let marks = vec![walls(course), joints(course), gates(&circuit)];
+        let [gate_0, driven] = start(&circuit);
+        let marks = vec![walls(course), joints(course), gates(&circuit), gate_0, driven];
         folder.write(
             "course.svg",
-            single("The course", "Walls, joints and gates.", map("", marks)).to_svg()?,
+            single(
+                "The course",
+                "Walls, joints and gates; where laps begin, and the way they are driven.",
+                map("", marks),
+            )
+            .to_svg()?,
         )?;
         folder.finish(&session.manifest(json!({ "world": source.label }), vec![source.input.clone()]))?;
     }

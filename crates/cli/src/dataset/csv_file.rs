@@ -86,6 +86,24 @@ impl CsvFile {
         name.strip_suffix(".csv").unwrap_or(name).to_owned()
     }
 
+    /// Whether the first line is a row of numbers.
+    pub(crate) fn starts_with_numbers(&self) -> bool {
+        self.header.iter().all(|name| name.parse::<f64>().is_ok())
+    }
+
+    /// Nothing, if the first line names the columns.
+    ///
+    /// # Errors
+    /// It is a row of numbers.
+    pub(crate) fn check_names(&self) -> Result<()> {
+        if self.starts_with_numbers() {
+            return Err(
+                self.header_error("a row of numbers; a line with the names of the columns must come first")
+            );
+        }
+        Ok(())
+    }
+
     /// The index of a column.
     pub(crate) fn column(&self, name: &str) -> Option<usize> {
         self.header.iter().position(|column| column == name)

@@ -54,11 +54,7 @@ pub(super) fn run(path: &Path, bytes: &[u8]) -> Result<(Rows, Vec<usize>, Input)
 
 impl Columns {
     fn find(file: &CsvFile) -> Result<Self> {
-        if file.header.iter().all(|name| name.parse::<f64>().is_ok()) {
-            return Err(
-                file.header_error("a row of numbers; a line with the names of the columns must come first")
-            );
-        }
+        file.check_names()?;
         let column = |name: &str| {
             let known = file.header.join(", ");
             file.column(name)

@@ -146,9 +146,9 @@ fn claims(study: &Study, comparison: &Comparison, distances: &Distances) -> Vec<
             "The runs differ among themselves, so that one simulation cannot match them all at the same time",
             "runs a to c at 2.3 to 2.4, run d at 0.5",
             &format!(
-                "runs up to {} apart; {:.1} of {runs} runs differ from the simulation at 5 %",
+                "runs up to {} apart; {} of {runs} runs differ from the simulation at 5 %",
                 apart.text(1),
-                missed.mean
+                (10.0 * missed.mean).round() / 10.0
             ),
             comparison.tally(|draw| {
                 let unequal = (0..runs).any(|a| (0..a).any(|b| draw.differ(a, b)));
@@ -234,7 +234,10 @@ fn responses(study: &Study) -> Result<Vec<(&'static str, Response)>> {
             Variant::OriginalSensor => study.standard.with("sensor.kind", "original")?,
             _ => study.standard.clone(),
         };
-        Ok((name, setup::model(&config, study.circuit())?.machine.response))
+        Ok((
+            name,
+            setup::model(&config, &study.circuit().course)?.machine.response,
+        ))
     };
     Ok(vec![
         response(Variant::Standard, "improved model")?,

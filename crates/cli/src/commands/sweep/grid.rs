@@ -188,7 +188,7 @@ fn setup(
     config: &Config,
     scenes: &mut BTreeMap<String, Scene>,
 ) -> Result<Setup, sim::Error> {
-    let model = setup::model(config, base.circuit)?;
+    let model = setup::model(config, &base.circuit.course)?;
     let machine = &model.machine;
     let cut = format!(
         "{:?} {} {} {:?}",
