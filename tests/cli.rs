@@ -25,9 +25,22 @@ fn every_command_teaches_itself() {
             overview.contains(&format!("  {command} ")),
             "{command} is not listed"
         );
-        let help = scratch.done([command, "--help"]).stdout;
-        assert!(help.contains("Usage: lapwing") && help.len() > 300, "{help}");
+        explains(&scratch, &[command]);
     }
+    for command in [["world", "check"], ["world", "segments"], ["bench", "rays"]] {
+        explains(&scratch, &command);
+    }
+}
+
+/// `lapwing help COMMAND` and `lapwing COMMAND --help` say the same, with an example.
+fn explains(scratch: &Scratch, command: &[&str]) {
+    let help = scratch.done([&["help"], command].concat()).stdout;
+    let example = format!("Example: lapwing {}", command.join(" "));
+    assert!(
+        help.contains(&example) && help.contains("Usage: lapwing"),
+        "{help}"
+    );
+    assert_eq!(scratch.done([command, &["--help"]].concat()).stdout, help);
 }
 
 #[test]
@@ -141,6 +154,19 @@ fn remarks_go_to_stderr_and_quiet_silences_them() {
     assert!(ran.stdout.contains("0 of 2"), "{}", ran.stdout);
     let quiet = scratch.done(drive.into_iter().chain(spinning).chain(["--quiet"]));
     assert_eq!(quiet.stderr, "");
+}
+
+#[test]
+fn effects_are_listed_with_the_ranges_of_their_parameters() {
+    let said = Scratch::new().done(["effects"]).stdout;
+    for effect in [
+        "wheel-asymmetry (act)\n  the left wheel's speed times ratio\n    ratio [0.5, 2], neutral 1\n",
+        "    counts [0, 4000] counts, neutral 0\n    azimuth_rad [-6.283, 6.283] rad\n",
+        "    wall outer or inner\n    position [0, 1] fraction of the wall\n",
+    ] {
+        assert!(said.contains(effect), "{said}");
+    }
+    assert!(said.lines().all(|line| line.chars().count() <= 110), "{said}");
 }
 
 #[test]

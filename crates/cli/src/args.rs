@@ -33,27 +33,19 @@ pub(crate) struct Global {
     pub(crate) quiet: bool,
 }
 
+/// What the program can be asked for.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
-    /// Both experiments of the paper on the circuit: tables, figures, report
     Reproduce(Reproduce),
-    /// Simulate laps and write them as a data set
     Drive(Drive),
-    /// Compare data sets, runs or gate tables with a Point Distribution Model
     Compare(Compare),
-    /// Simulate a grid of model settings and compare each with measured runs
     Sweep(Sweep),
-    /// Look at a world file: check it, cut its walls
     #[command(subcommand)]
     World(World),
-    /// Fit the nonlinear response of an infra-red sensor to measured pairs
     FitSensor(FitSensor),
-    /// Trace what the model lacks in measured laps, add it, and tell the error before and after
     Trace(Trace),
-    /// Measure what the program itself costs
     #[command(subcommand)]
     Bench(Bench),
-    /// List the effects that the simulator knows beyond the declared model
     Effects(Effects),
 }
 
@@ -77,8 +69,10 @@ pub(crate) struct Settings {
     pub(crate) world: Option<PathBuf>,
 }
 
-/// Both experiments of section IV: the two controllers, the sensor models, the wall approximation, the wheel slip,
-/// and all of them together; every table of the paper beside ours, every figure, and each claim with its numbers.
+/// Both experiments of the paper on the circuit: tables, figures, report
+///
+/// These are the two controllers of section IV, and the sensor models, the wall approximation, the wheel slip, and all of them
+/// together; every table of the paper beside ours, every figure, and each claim with its numbers.
 /// In the end what the model lacks in these laps is traced, and Tables II and III are made again with it.
 ///
 /// Example: lapwing reproduce --seeds 100 --out report
@@ -130,7 +124,9 @@ impl Default for Reproduce {
     }
 }
 
-/// Simulates runs of laps and writes them as a data set that `compare` reads.
+/// Simulate laps and write them as a data set
+///
+/// The folder holds a CSV for each run, which `compare`, `sweep` and `trace` read, the model, and a picture of the laps.
 ///
 /// Example: lapwing drive roduit2007 --set slip.level=1 --runs 4 --laps 20 --log --out slippery
 #[derive(Debug, Args)]
@@ -160,11 +156,15 @@ pub(crate) struct Drive {
     pub(crate) json: bool,
 }
 
+/// Compare data sets, runs or gate tables with a Point Distribution Model
+///
 /// Builds one Point Distribution Model of all clusters together and gives the distance of every pair (eq. 8), Hotelling's
 /// test (eq. 9) and the energy test.
 ///
 /// Each of the arguments is a data set (a folder; every run is a cluster), one run's CSV, or with --sampled a table of
 /// laps that are sampled already.
+///
+/// Example: lapwing compare slippery real --modes 5
 #[derive(Debug, Args)]
 pub(crate) struct Compare {
     /// Data sets, runs, or gate tables
@@ -190,7 +190,10 @@ pub(crate) struct Compare {
     pub(crate) out: Option<PathBuf>,
 }
 
-/// Simulates the grid of all values given and compares each point with every measured run.
+/// Simulate a grid of model settings and compare each with measured runs
+///
+/// All values given of one key are combined with all of the others. A grid point is simulated whole and compared with every
+/// measured run.
 ///
 /// Example: lapwing sweep roduit2007 --vary wall.max_error_m=0.001,0.01 --vary slip.level=0.1,1 --measured real --out sweep
 #[derive(Debug, Args)]
@@ -223,10 +226,17 @@ pub(crate) struct Sweep {
     pub(crate) json: bool,
 }
 
-/// What can be asked of a world.
+/// Look at a world file: check it, cut its walls
+///
+/// Example: lapwing world check circuit.toml
 #[derive(Debug, Subcommand)]
 pub(crate) enum World {
     /// Check a world file: walls, lengths, corridor width, gates
+    ///
+    /// A wall that has a gap or a corner, crosses itself or the other, or leaves the shipped robot no room is refused, with its
+    /// place and how to mend it.
+    ///
+    /// Example: lapwing world check circuit.toml --out course
     Check {
         /// World file, or the name of a shipped world
         world: PathBuf,
@@ -238,6 +248,8 @@ pub(crate) enum World {
         out: Option<PathBuf>,
     },
     /// Cut the walls into straight segments for given maximal errors
+    ///
+    /// Example: lapwing world segments roduit2007 --max-error 0.001,0.005
     Segments {
         /// World file, or the name of a shipped world
         world: PathBuf,
@@ -259,7 +271,12 @@ pub(crate) enum World {
     },
 }
 
-/// Fits reading = a / (1 + (d/d0)^p) by least squares on log reading.
+/// Fit the nonlinear response of an infra-red sensor to measured pairs
+///
+/// Fits reading = a / (1 + (d/d0)^p) by least squares on log reading, and ends with the settings that take the result into a
+/// model. The pairs must lie on both sides of d0, where the reading has halved.
+///
+/// Example: lapwing fit-sensor pairs.csv --columns distance_m,counts
 #[derive(Debug, Args)]
 pub(crate) struct FitSensor {
     /// CSV with a header; by default the first column is the distance in m and the second the reading
@@ -275,7 +292,13 @@ pub(crate) struct FitSensor {
     pub(crate) out: Option<PathBuf>,
 }
 
-/// Lists every effect with its stage and parameters.
+/// List the effects that the simulator knows beyond the declared model
+///
+/// Each with its stage, what it does, and its parameters: the range of each, its unit, and the value at which the effect changes
+/// nothing. They stand in a model as `[[effect]]` tables; a value that changes in time (by = "time") goes no farther than the end of
+/// its range.
+///
+/// Example: lapwing effects --json
 #[derive(Debug, Args)]
 pub(crate) struct Effects {
     /// Print one JSON document
@@ -283,6 +306,8 @@ pub(crate) struct Effects {
     pub(crate) json: bool,
 }
 
+/// Trace what the model lacks in measured laps, add it, and tell the error before and after
+///
 /// Finds the residual between the declared model and measured laps, names the effect behind it with its size, what else it
 /// could be, and how far the simulation is from the robot before and after the effect is added.
 ///
@@ -309,13 +334,17 @@ pub(crate) struct Trace {
     pub(crate) json: bool,
 }
 
-/// What can be measured.
+/// Measure what the program itself costs
+///
+/// Example: lapwing bench rays --segments 47,1000
 #[derive(Debug, Subcommand)]
 pub(crate) enum Bench {
     /// Ray casting: cost against the number of segments, and faithfulness against cost
     ///
     /// Eight rays at the poses of a driven lap, by a plain loop, the BVH of parry2d and lapwing's own casters. Leave the
     /// machine alone while it measures.
+    ///
+    /// Example: lapwing bench rays --segments 47,1000 --out rays
     Rays {
         /// Numbers of segments; the circuit is cut as finely as they need
         #[arg(
