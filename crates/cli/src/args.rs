@@ -298,7 +298,7 @@ pub(crate) struct FitSensor {
 /// List the effects that the simulator knows beyond the declared model
 ///
 /// Each with its stage, what it does, and its parameters: the range of each, its unit, and the value at which the effect changes
-/// nothing. They stand in a model as [[effect]] tables; a value that changes in time (by = "time") goes no farther than the end of
+/// nothing. They stand in a model as `[[effect]]` tables; a value that changes in time (by = "time") goes no farther than the end of
 /// its range.
 ///
 /// Example: lapwing effects --json

@@ -4,33 +4,42 @@ use diagnose::mean_lap;
 
 use super::Trace;
 use crate::laps::SampledRun;
+use crate::table::Table;
 
 /// The mean laps gate by gate as CSV, recording by recording.
 pub(crate) fn gates_csv(trace: &Trace) -> String {
-    let mut csv = String::from("data_set,gate,measured_m,before_m,after_m\n");
+    let mut table = Table::new("", &["data_set", "gate", "measured_m", "before_m", "after_m"]);
     for errors in &trace.errors {
         let laps: Vec<Vec<f64>> = errors.held_out.iter().flat_map(SampledRun::offsets_m).collect();
-        let name = errors.held_out.first().map_or("", |run| &run.set);
+        let name = errors
+            .held_out
+            .first()
+            .map_or(String::new(), |run| run.set.clone());
         for (gate, measured) in mean_lap(&laps).unwrap_or_default().iter().enumerate() {
             let (before, after) = (errors.before.mean_m()[gate], errors.after.mean_m()[gate]);
-            csv += &format!("{name},{gate},{measured:.6},{before:.6},{after:.6}\n");
+            let curves = [measured, &before, &after].map(|offset_m| format!("{offset_m:.6}"));
+            table.push([name.clone(), gate.to_string()].into_iter().chain(curves));
         }
     }
-    csv
+    table.to_csv()
 }
 
 /// How runs start as CSV, recording by recording where that is known.
 pub(crate) fn starts_csv(trace: &Trace) -> String {
-    let mut csv = String::from("data_set,t_s,measured_mm,before_mm,after_mm\n");
+    let mut table = Table::new("", &["data_set", "t_s", "measured_mm", "before_mm", "after_mm"]);
     for errors in &trace.errors {
-        let name = errors.held_out.first().map_or("", |run| &run.set);
+        let name = errors
+            .held_out
+            .first()
+            .map_or(String::new(), |run| run.set.clone());
         let Some(starts) = &errors.starts else {
             continue;
         };
         let simulated = starts.before.ahead_mm().zip(starts.after.ahead_mm());
         for ((time_s, measured), ((_, before), (_, after))) in starts.measured.ahead_mm().zip(simulated) {
-            csv += &format!("{name},{time_s:.3},{measured:.3},{before:.3},{after:.3}\n");
+            let curves = [time_s, measured, before, after].map(|number| format!("{number:.3}"));
+            table.push(std::iter::once(name.clone()).chain(curves));
         }
     }
-    csv
+    table.to_csv()
 }
