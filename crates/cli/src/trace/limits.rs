@@ -8,7 +8,7 @@ use sim::{Param, Stage};
 use super::Trace;
 use super::answer::{FromLogs, rivals};
 use super::document::distinct;
-use super::next::{Experiment, MOST_LAPS};
+use super::next::{Experiment, MOST_LAPS, to_tell_from};
 use super::pages::{cause_in_words, described};
 use super::recording::{Recording, files, runs};
 use crate::dataset::Log;
@@ -116,9 +116,10 @@ fn no_experiment(trace: &Trace) -> String {
             _ => "Nothing is claimed, and no experiment was looked for.".to_owned(),
         };
     };
-    let others = rivals(answer).iter().skip(1).chain(answer.further());
-    let others = others.filter(|other| other.names() != claimed.names());
-    let others = distinct(others.map(Explanation::label));
+    let others: Vec<String> = to_tell_from(answer, claimed)
+        .into_iter()
+        .map(Explanation::label)
+        .collect();
     if others.is_empty() {
         return "There is nothing to tell apart.".to_owned();
     }

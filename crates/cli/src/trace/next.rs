@@ -1,7 +1,7 @@
 //! The experiment that would tell apart what these data do not.
 
 use anyhow::Result;
-use diagnose::{Explanation, Extent, LogRow, ObservedRun, Rival, log_separation, separations};
+use diagnose::{Answer, Explanation, Extent, LogRow, ObservedRun, Rival, log_separation, separations};
 use sim::{Controller, Setting, Stage, Step, Streams};
 
 use super::Trace;
@@ -110,6 +110,19 @@ fn ideas(config: &Config, setup: &Setup) -> Vec<(String, Vec<(&'static str, Stri
     ideas
 }
 
+/// What has to be told from the explanation that is claimed: its rivals by other names and what may be there besides, the best of each
+/// set of names.
+pub(super) fn to_tell_from<'a>(answer: &'a Answer, claimed: &Explanation) -> Vec<&'a Explanation> {
+    let mut others: Vec<&Explanation> = Vec::new();
+    for rival in rivals(answer).iter().skip(1).chain(answer.further()) {
+        let mut known = others.iter().copied().chain([claimed]);
+        if !known.any(|other| other.names() == rival.names()) {
+            others.push(rival);
+        }
+    }
+    others
+}
+
 /// Experiments that would tell the answer from its rivals, and from what may be there besides, the best first; none where nothing
 /// has to be told apart.
 ///
@@ -119,16 +132,8 @@ pub(crate) fn experiments(trace: &Trace, seed: u64) -> Result<Vec<Experiment>> {
     let Some(answer) = trace.answer.claimed() else {
         return Ok(Vec::new());
     };
-    let mut others: Vec<&Explanation> = Vec::new();
-    for rival in (rivals(&trace.answer).iter().skip(1)).chain(trace.answer.further()) {
-        let known = others
-            .iter()
-            .chain([&answer])
-            .any(|other| other.names() == rival.names());
-        if !known && others.len() < RIVALS {
-            others.push(rival);
-        }
-    }
+    let mut others = to_tell_from(&trace.answer, answer);
+    others.truncate(RIVALS);
     if others.is_empty() {
         return Ok(Vec::new());
     }
