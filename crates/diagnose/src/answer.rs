@@ -56,6 +56,25 @@ impl Explanation {
         self.effects.iter().map(|effect| effect.setting.clone()).collect()
     }
 
+    /// The effects with one fitted number moved by its standard error, number by number: up, or down where it would leave its range.
+    pub fn moved(&self) -> Vec<Vec<Setting>> {
+        let mut all = Vec::new();
+        for (number, effect) in self.effects.iter().enumerate() {
+            let (setting, values) = (&effect.setting, effect.setting.pattern.numbers());
+            for (place, &error) in effect.standard_errors.iter().enumerate() {
+                if error > 0.0 {
+                    let leaves = |param: &sim::Param| values[place] + error > param.high;
+                    let down = setting.param(place).is_some_and(leaves);
+                    let mut settings = self.settings();
+                    settings[number].pattern =
+                        setting.pattern.moved(place, if down { -error } else { error });
+                    all.push(settings);
+                }
+            }
+        }
+        all
+    }
+
     /// The effects' names.
     pub fn names(&self) -> Vec<&'static str> {
         self.effects

@@ -47,17 +47,6 @@ impl Candidate {
         [(value - reach).max(low), (value + reach).min(high)]
     }
 
-    /// The relative error of its size: the least of its fitted values'.
-    pub fn relative_error(&self) -> f64 {
-        let of_value = |(place, (value, error)): (usize, (f64, &f64))| {
-            let neutral = self.setting.param(place)?.neutral?;
-            (*error > 0.0).then(|| error / (value - neutral).abs().max(1e-12))
-        };
-        let values = self.setting.pattern.numbers().into_iter();
-        let errors = values.zip(&self.standard_errors).enumerate().filter_map(of_value);
-        errors.fold(1.0, f64::min)
-    }
-
     /// The stage of the loop in which it acts.
     pub fn stage(&self) -> Stage {
         stage_of(&self.setting)

@@ -241,7 +241,11 @@ fn by_laps(
     let rivals: Vec<Rival> = (others.iter())
         .map(|other| Rival {
             settings: first_runs(&other.settings()),
-            relative_error: other.effects[0].relative_error(),
+            moved: other
+                .moved()
+                .iter()
+                .map(|settings| first_runs(settings))
+                .collect(),
         })
         .collect();
     let found = separations(&simulate, &first_runs(&answer.settings()), &rivals)?;

@@ -30,6 +30,19 @@ impl Pattern {
             Self::ByTime { start, per_s } => [start.as_slice(), per_s].concat(),
         }
     }
+
+    /// The pattern with one of these numbers, which must be there, moved.
+    #[must_use]
+    pub fn moved(&self, place: usize, by: f64) -> Self {
+        let mut moved = self.clone();
+        let number = match &mut moved {
+            Self::Constant(values) => values.get_mut(place),
+            Self::ByRun(runs) => runs.iter_mut().flatten().nth(place),
+            Self::ByTime { start, per_s } => start.iter_mut().chain(per_s).nth(place),
+        };
+        *number.expect("a pattern has this number") += by;
+        moved
+    }
 }
 
 /// An effect with its values.
