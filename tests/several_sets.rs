@@ -41,8 +41,10 @@ fn what_is_held_out_is_held_against_the_declaration_that_it_has() {
     robot.record(&scratch, "set");
     let reactive = reactive(robot);
     reactive.record(&scratch, "reactive");
+    // The way round is the world's, said or not.
     let longer = Robot {
         laps: vec![5; 2],
+        declared: "controller.gain_per_count = 0.001\nrun.direction = \"clockwise\"",
         ..reactive
     };
     longer.record(&scratch, "unseen");

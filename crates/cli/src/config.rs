@@ -228,6 +228,15 @@ impl Config {
         Ok(self.overlaid(declared)?)
     }
 
+    /// This configuration with the way round named that it has on a course.
+    pub(crate) fn going_round(mut self, course: &track::Course) -> Self {
+        self.run.direction = match self.run.direction.on(course) {
+            track::Direction::Clockwise => Direction::Clockwise,
+            track::Direction::CounterClockwise => Direction::CounterClockwise,
+        };
+        self
+    }
+
     /// This configuration with one key set: `value` as on the command line.
     ///
     /// # Errors

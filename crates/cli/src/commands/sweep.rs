@@ -15,6 +15,7 @@ use anyhow::{Context, Result, bail};
 use rayon::prelude::*;
 use serde_json::{Value, json};
 use sim::{Circuit, Streams};
+use track::Course;
 
 use crate::args;
 use crate::config::{Config, WorldSource};
@@ -79,7 +80,7 @@ impl Sweep {
         let world = file.world(args.model.settings.world.as_deref())?;
         let circuit = setup::model_circuit(&file, &world)?;
         let set = measured_set(args, &world)?;
-        remark_on_declared(session, &set, &file.config)?;
+        remark_on_declared(session, &set, &file.config, &circuit.course)?;
         let base = Base {
             file: &file,
             world: &world,
@@ -206,7 +207,7 @@ fn measured_set(args: &args::Sweep, world: &WorldSource) -> Result<DataSet> {
 }
 
 /// Says where the model departs from what the measured robot was set to: the sweep may well mean it.
-fn remark_on_declared(session: &Session, set: &DataSet, config: &Config) -> Result<()> {
+fn remark_on_declared(session: &Session, set: &DataSet, config: &Config, course: &Course) -> Result<()> {
     let name = &set.name;
     if let Some(kind) = set.controller.filter(|&kind| kind != config.controller.kind) {
         let (measured, model) = (kind.name(), config.controller.kind.name());
@@ -214,7 +215,9 @@ fn remark_on_declared(session: &Session, set: &DataSet, config: &Config) -> Resu
             "{name} was driven by the {measured} controller, the model has {model}"
         ));
     }
-    if set.declared_config(config)? != *config {
+    let declares_other =
+        set.declared_config(config)?.going_round(course) != config.clone().going_round(course);
+    if declares_other {
         let declared = set.declared.to_string();
         let declared = declared.trim().replace('\n', "; ");
         session.remark(&format!(

@@ -144,6 +144,7 @@ impl Recording {
         let source = file.world(world)?;
         belongs(&set, &config, &source.text)?;
         let circuit = setup::circuit(&source, config.run.gates)?;
+        let config = config.going_round(&circuit.course);
         let measured = Measured::on(set, circuit.clone(), &file.config)?;
         measured
             .runs
@@ -396,7 +397,8 @@ impl HeldOut {
     /// # Errors
     /// Data of another world, controller or declaration.
     pub(super) fn new(recordings: &[Recording], file: &ModelFile, set: DataSet) -> Result<Self> {
-        let config = set.declared_config(&file.config)?;
+        let course = &recordings[0].setup.scene.circuit().course;
+        let config = set.declared_config(&file.config)?.going_round(course);
         let shown = set.folder.display().to_string();
         let place = recordings
             .iter()
