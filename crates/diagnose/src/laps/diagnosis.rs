@@ -261,7 +261,7 @@ fn questioned(search: &Search<'_>, found: Vec<Found>) -> Vec<Found> {
 }
 
 /// Explanations with those that are the first, or what may be there besides, but for a bump or patch at the same place of a wall or
-/// another kind of slip, and those near the first but for other sensors, in their order.
+/// another kind of slip, those that are the first but for the wall opposite, and those near it but for other sensors, in their order.
 fn with_others_alike(search: &Search<'_>, found: Vec<Found>) -> Vec<Found> {
     let Some(first) = found.first().filter(|first| is_claimed(&first.explanation)) else {
         return found;
@@ -273,6 +273,10 @@ fn with_others_alike(search: &Search<'_>, found: Vec<Found>) -> Vec<Found> {
     let further = further.max_by(|a, b| a.explanation.score.total_cmp(&b.explanation.score));
     others.extend(further.map_or_else(Vec::new, |further| search.otherwise(further, &found)));
     others.extend(search.at_other_sensors(&found));
+    // Where the first does not suffice that was tried before.
+    if suffices(&first.explanation) {
+        others.extend(search.on_wall_opposite(&found));
+    }
     in_their_places(found, others, search.atlas())
 }
 
