@@ -137,22 +137,11 @@ fn remarks_go_to_stderr_and_quiet_silences_them() {
         "--set",
         "run.patience_laps=1",
     ];
-    let drive = [
-        "drive",
-        "--name",
-        "laps",
-        "roduit2007",
-        "--runs",
-        "1",
-        "--laps",
-        "2",
-        "--out",
-        "laps",
-    ];
-    let ran = scratch.done(drive.into_iter().chain(spinning));
+    let named = [&["--name", "laps"], &spinning[..]].concat();
+    let ran = scratch.drive(1, 2, "laps", &named);
     assert_eq!(ran.stderr, "lapwing: laps/a: 0 of 2 laps (the run timed out)\n");
     assert!(ran.stdout.contains("0 of 2"), "{}", ran.stdout);
-    let quiet = scratch.done(drive.into_iter().chain(spinning).chain(["--quiet"]));
+    let quiet = scratch.drive(1, 2, "laps", &[&named[..], &["--quiet"]].concat());
     assert_eq!(quiet.stderr, "");
 }
 
@@ -225,19 +214,7 @@ fn compare_names_runs_after_their_data_set() {
 #[test]
 fn a_drive_is_a_data_set_that_compare_reads() {
     let scratch = Scratch::new();
-    scratch.done([
-        "drive",
-        "--name",
-        "laps",
-        "roduit2007",
-        "--runs",
-        "27",
-        "--laps",
-        "2",
-        "--log",
-        "--out",
-        "laps",
-    ]);
+    scratch.drive(27, 2, "laps", &["--name", "laps", "--log"]);
     let document = scratch.json(["compare", "laps", "--permutations", "0", "--json"]);
     let clusters = document["clusters"].as_array().unwrap();
     assert_eq!(

@@ -4,12 +4,6 @@ use serde_json::Value;
 
 use crate::support::Scratch;
 
-/// Simulates a small data set into a folder.
-fn drive(scratch: &Scratch, folder: &str, more: &[&str]) {
-    let args = ["drive", "roduit2007", "--laps", "4", "--out", folder];
-    scratch.done(args.iter().chain(more));
-}
-
 /// Laps that are sampled already, each at so many coordinates.
 fn table(seed: u32, laps: u32, coordinates: u32) -> String {
     let names: Vec<String> = (0..coordinates).map(|gate| format!("c{gate}")).collect();
@@ -34,13 +28,9 @@ fn names(document: &Value) -> Vec<&str> {
 fn names_that_repeat_give_way_to_paths() {
     let scratch = Scratch::new();
     for (folder, seed) in [("one", "1"), ("two", "2")] {
-        drive(
-            &scratch,
-            folder,
-            &["--name", "set", "--runs", "2", "--seed", seed],
-        );
+        scratch.drive(2, 4, folder, &["--name", "set", "--seed", seed]);
     }
-    drive(&scratch, "other", &["--name", "other", "--runs", "1"]);
+    scratch.drive(1, 4, "other", &["--name", "other"]);
     let document = scratch.json(["compare", "one/", "two", "other", "--json", "--out", "o"]);
     assert_eq!(names(&document), ["one/a", "one/b", "two/a", "two/b", "other/a"]);
     assert_eq!(
@@ -83,7 +73,7 @@ fn gate_tables_of_one_name_are_told_apart() {
 fn pairs_are_csv_whatever_clusters_are_called() {
     let scratch = Scratch::new();
     let odd = "a \"set\", on\ntwo lines";
-    drive(&scratch, "set", &["--name", "set", "--runs", "2"]);
+    scratch.drive(2, 4, "set", &["--name", "set"]);
     let description = scratch.read("set/dataset.toml");
     let odd_name = format!("name = {}", Value::from(odd));
     scratch.write(
@@ -186,7 +176,7 @@ fn sampled_laps_have_no_unit() {
     assert!(modes.contains(">mode 1 (") && !modes.contains("mm"), "{modes}");
     // Numbers up to 1, as they stand in the table.
     assert!(modes.contains(">0.5<") && !modes.contains(">500<"), "{modes}");
-    drive(&scratch, "set", &["--runs", "1"]);
+    scratch.drive(1, 4, "set", &[]);
     scratch.done(["compare", "set", "--out", "o"]);
     assert!(scratch.read("o/modes.svg").contains(">mode 1, mm ("));
 }
@@ -194,7 +184,7 @@ fn sampled_laps_have_no_unit() {
 #[test]
 fn laps_that_were_written_are_compared_to_the_same_distances() {
     let scratch = Scratch::new();
-    drive(&scratch, "set", &["--name", "set", "--runs", "3"]);
+    scratch.drive(3, 4, "set", &["--name", "set"]);
     let whole = scratch.json(["compare", "set", "--out", "o", "--json"]);
     let tables = ["a", "b", "c"].map(|run| format!("o/laps/set_{run}.csv"));
     let args = ["compare", "--sampled", "--json"].map(str::to_owned);

@@ -77,18 +77,7 @@ fn another_seed_is_another_result() {
     let drive = |seed: &str| {
         let folder = format!("{seed}/out");
         std::fs::create_dir(scratch.path(seed)).unwrap();
-        scratch.done([
-            "drive",
-            "roduit2007",
-            "--runs",
-            "1",
-            "--laps",
-            "1",
-            "--seed",
-            seed,
-            "--out",
-            &folder,
-        ]);
+        scratch.drive(1, 1, &folder, &["--seed", seed]);
         scratch.read(&format!("{folder}/run_a.csv"))
     };
     assert_ne!(drive("1"), drive("2"));

@@ -14,21 +14,11 @@ fn drive(scratch: &Scratch, args: &[&str]) -> (String, Value) {
 #[test]
 fn a_drive_says_what_compare_will_call_it() {
     let scratch = Scratch::new();
-    let args = [
-        "drive",
-        "roduit2007",
-        "--runs",
-        "2",
-        "--laps",
-        "3",
-        "--out",
-        "slippery",
-    ];
-    let said = scratch.done(args).stdout;
+    let said = scratch.drive(2, 3, "slippery", &[]).stdout;
     let (_, name) = said.trim_end().rsplit_once("written to slippery, as ").unwrap();
     let compared = scratch.done(["compare", "slippery"]).stdout;
     assert!(compared.contains(&format!("{name}/a  ")), "{said}{compared}");
-    let said = scratch.done(args.iter().chain(&["--name", "mine"])).stdout;
+    let said = scratch.drive(2, 3, "slippery", &["--name", "mine"]).stdout;
     assert!(said.ends_with("\nwritten to slippery, as mine\n"), "{said}");
 }
 

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use crate::support::{LAPWING, ROOT, Ran, Scratch, measured, world_with};
+use crate::support::{LAPWING, ROOT, Ran, Scratch, interrupt, measured, world_with};
 
 /// The first and the last control point of the outer wall, and the joint of its first two splines.
 const START: &str = "control_points = [[0.55675, 1.02435]";
@@ -658,18 +658,7 @@ fn folders_that_are_not_ours_or_cannot_be_made() {
     );
     // An empty folder and an earlier result of ours are replaced.
     for seed in ["1", "2"] {
-        scratch.done([
-            "drive",
-            "roduit2007",
-            "--runs",
-            "1",
-            "--laps",
-            "3",
-            "--seed",
-            seed,
-            "--out",
-            "empty",
-        ]);
+        scratch.drive(1, 3, "empty", &["--seed", seed]);
     }
     assert!(scratch.read("empty/manifest.json").contains("\"seed\": 2"));
     // Not what a result is made from, nor what somebody else has put there.
@@ -783,12 +772,7 @@ fn an_interrupted_drive_leaves_nothing() {
             assert_eq!(child.try_wait().unwrap(), None);
             std::thread::yield_now();
         }
-        let signal = std::process::Command::new("kill")
-            .args(["-INT", &child.id().to_string()])
-            .status()
-            .unwrap();
-        assert!(signal.success());
-        let ran = Ran::from(child.wait_with_output().unwrap());
+        let ran = interrupt(child);
         assert_eq!(ran.stderr, "lapwing: interrupted: nothing was written\n");
         assert_eq!((ran.status, ran.stdout.as_str()), (Some(2), ""));
         assert!(crate::support::files(&scratch.path("")).is_empty());

@@ -215,18 +215,7 @@ fn a_log_that_no_controller_gives_is_named() {
 fn sensors_that_leap_at_their_range_and_have_no_noise_there_are_traced_by_logs() {
     let scratch = Scratch::new();
     let kind = ["--set", "sensor.kind=original"];
-    let drive = [
-        "drive",
-        "roduit2007",
-        "--runs",
-        "2",
-        "--laps",
-        "3",
-        "--log",
-        "--out",
-        "set",
-    ];
-    scratch.done([drive.as_slice(), &kind].concat());
+    scratch.drive(2, 3, "set", &[&kind[..], &["--log"]].concat());
     let found = trace(&scratch, "braitenberg", "set", &kind);
     says(&found, "faithful", &[]);
     assert!(

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::ffi::OsStr;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::{Child, Command, Output};
 
 use serde_json::Value;
 use tempfile::TempDir;
@@ -87,6 +87,22 @@ impl Scratch {
         ran
     }
 
+    /// Simulates so many runs of so many laps of the shipped model, with further arguments, into a folder of this one.
+    pub(crate) fn drive(&self, runs: u32, laps: u32, folder: &str, more: &[&str]) -> Ran {
+        let [runs, laps] = [runs, laps].map(|count| count.to_string());
+        let drive = [
+            "drive",
+            "roduit2007",
+            "--runs",
+            &runs,
+            "--laps",
+            &laps,
+            "--out",
+            folder,
+        ];
+        self.done([&drive, more].concat())
+    }
+
     /// Runs the program in this folder, which must print one JSON document.
     pub(crate) fn json<S: AsRef<OsStr>>(&self, args: impl IntoIterator<Item = S>) -> Value {
         serde_json::from_str(&self.done(args).stdout).unwrap()
@@ -120,6 +136,15 @@ impl Scratch {
         assert!(!results.is_empty(), "{folder} is empty");
         results
     }
+}
+
+/// Presses Ctrl-C on a program that runs, and waits for its end.
+pub(crate) fn interrupt(child: Child) -> Ran {
+    let signal = Command::new("kill")
+        .args(["-INT", &child.id().to_string()])
+        .status();
+    assert!(signal.unwrap().success());
+    child.wait_with_output().unwrap().into()
 }
 
 /// All files below a folder with their bytes, and its subfolders without any.

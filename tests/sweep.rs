@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::process::Stdio;
 use std::time::{Duration, Instant};
 
-use crate::support::{Ran, Scratch, differing, files, measured};
+use crate::support::{Ran, Scratch, differing, files, interrupt, measured};
 
 fn rows(scratch: &Scratch, folder: &str) -> (String, Vec<Vec<String>>) {
     let text = scratch.read(&format!("{folder}/sweep.csv"));
@@ -106,20 +106,7 @@ fn a_point_is_simulated_as_if_it_stood_alone() {
         ]);
     };
     sweep("slip.level=1", "alone");
-    scratch.done([
-        "drive",
-        "--name",
-        "drive",
-        "roduit2007",
-        "--set",
-        "slip.level=1",
-        "--runs",
-        "1",
-        "--laps",
-        "3",
-        "--out",
-        "drive",
-    ]);
+    scratch.drive(1, 3, "drive", &["--name", "drive", "--set", "slip.level=1"]);
     let pairs = scratch.json(["compare", &set, "drive", "--permutations", "0", "--json"])["pairs"].clone();
     let with_run_a = pairs
         .as_array()
@@ -245,12 +232,7 @@ fn interrupted<'a>(scratch: &Scratch, args: impl Iterator<Item = &'a str>) -> Ra
     while units() < before + 3 && begun.elapsed() < Duration::from_secs(60) {
         std::thread::yield_now();
     }
-    let signal = std::process::Command::new("kill")
-        .args(["-INT", &child.id().to_string()])
-        .status()
-        .unwrap();
-    assert!(signal.success());
-    child.wait_with_output().unwrap().into()
+    interrupt(child)
 }
 
 #[test]

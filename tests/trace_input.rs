@@ -211,18 +211,7 @@ fn positions_in_millimetres_are_refused() {
 fn laps_that_declare_no_direction_were_driven_as_the_model_says() {
     let scratch = Scratch::new();
     let backward = ["--set", "run.direction=\"counter-clockwise\""];
-    let drive = [
-        "drive",
-        "roduit2007",
-        "--runs",
-        "1",
-        "--laps",
-        "2",
-        "--out",
-        "set",
-        "--quiet",
-    ];
-    scratch.done([&drive[..], &backward].concat());
+    scratch.drive(1, 2, "set", &backward);
     let description = scratch.read("set/dataset.toml");
     let (undeclared, _) = description.split_once("[declared").unwrap();
     scratch.write("set/dataset.toml", undeclared);

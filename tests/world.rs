@@ -101,21 +101,11 @@ fn area_gone_round(csv: &str) -> f64 {
 fn a_robot_drives_round_as_its_world_says_unless_the_model_does() {
     let scratch = Scratch::new();
     scratch.write("mirrored.toml", mirrored_world());
-    let drive = [
-        "drive",
-        "roduit2007",
-        "--world",
-        "mirrored.toml",
-        "--runs",
-        "1",
-        "--laps",
-        "2",
-        "--out",
-    ];
-    scratch.done(drive.into_iter().chain(["as_the_world"]));
+    let mirrored = ["--world", "mirrored.toml"];
+    scratch.drive(1, 2, "as_the_world", &mirrored);
     assert!(area_gone_round(&scratch.read("as_the_world/run_a.csv")) > 0.0);
-    let clockwise = ["clockwise", "--set", "run.direction=clockwise"];
-    scratch.done(drive.into_iter().chain(clockwise));
+    let clockwise = [&mirrored[..], &["--set", "run.direction=clockwise"]].concat();
+    scratch.drive(1, 2, "clockwise", &clockwise);
     assert!(area_gone_round(&scratch.read("clockwise/run_a.csv")) < 0.0);
     // Both are read back as they were driven.
     let compared = scratch.json(["compare", "as_the_world", "clockwise", "--json"]);
@@ -127,25 +117,7 @@ fn a_robot_drives_round_as_its_world_says_unless_the_model_does() {
 #[test]
 fn a_folder_is_not_taken_for_the_shipped_world_of_its_name() {
     let scratch = Scratch::new();
-    scratch.done([
-        "drive",
-        "roduit2007",
-        "--runs",
-        "1",
-        "--laps",
-        "2",
-        "--out",
-        "roduit2007",
-    ]);
-    scratch.done([
-        "drive",
-        "roduit2007",
-        "--runs",
-        "1",
-        "--laps",
-        "2",
-        "--out",
-        "again",
-    ]);
+    scratch.drive(1, 2, "roduit2007", &[]);
+    scratch.drive(1, 2, "again", &[]);
     scratch.done(["world", "check", "roduit2007"]);
 }

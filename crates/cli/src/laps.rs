@@ -12,6 +12,7 @@ use crate::config::Config;
 use crate::dataset::{DataSet, RunFile};
 use crate::setup;
 use crate::sightings::{lost, without_strays};
+use crate::table::counted;
 
 /// The laps of one run that are analysed, and what was set aside.
 #[derive(Debug, Clone)]
@@ -214,10 +215,9 @@ fn sample(set: &DataSet, run: &RunFile, circuit: &Circuit, config: &Config) -> R
             );
         }
         bail!(
-            "{path}: {} whole lap{}, and the first is not analysed: at least two are needed, and four to trace; check the world, the \
+            "{path}: {}, and the first is not analysed: at least two are needed, and four to trace; check the world, the \
              driving direction ({}; [declared] run.direction in dataset.toml) and the unit of x_m and y_m",
-            whole.len(),
-            if whole.len() == 1 { "" } else { "s" },
+            counted(whole.len(), "whole lap"),
             config.run.direction.on(&circuit.course).name()
         );
     }

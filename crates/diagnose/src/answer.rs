@@ -58,21 +58,15 @@ impl Explanation {
 
     /// The effects with one fitted number moved by its standard error, number by number: up, or down where it would leave its range.
     pub fn moved(&self) -> Vec<Vec<Setting>> {
-        let mut all = Vec::new();
-        for (number, effect) in self.effects.iter().enumerate() {
-            let (setting, values) = (&effect.setting, effect.setting.pattern.numbers());
-            for (place, &error) in effect.standard_errors.iter().enumerate() {
-                if error > 0.0 {
-                    let leaves = |param: &sim::Param| values[place] + error > param.high;
-                    let down = setting.param(place).is_some_and(leaves);
-                    let mut settings = self.settings();
-                    settings[number].pattern =
-                        setting.pattern.moved(place, if down { -error } else { error });
-                    all.push(settings);
-                }
-            }
-        }
-        all
+        let with = |number: usize, setting: Setting| {
+            let mut settings = self.settings();
+            settings[number] = setting;
+            settings
+        };
+        let effects = self.effects.iter().enumerate();
+        effects
+            .flat_map(|(number, effect)| effect.moved().map(move |setting| with(number, setting)))
+            .collect()
     }
 
     /// The effects' names.

@@ -47,6 +47,27 @@ impl Candidate {
         [(value - reach).max(low), (value + reach).min(high)]
     }
 
+    /// The effect with one fitted number moved by its standard error, number by number: up, or down where it would leave its range.
+    pub(crate) fn moved(&self) -> impl Iterator<Item = Setting> {
+        let values = self.setting.pattern.numbers();
+        let fitted = self
+            .standard_errors
+            .iter()
+            .enumerate()
+            .filter(|(_, error)| **error > 0.0);
+        fitted.map(move |(place, &error)| {
+            let leaves = |param: &Param| values[place] + error > param.high;
+            let down = self.setting.param(place).is_some_and(leaves);
+            Setting {
+                spec: self.setting.spec,
+                pattern: self
+                    .setting
+                    .pattern
+                    .moved(place, if down { -error } else { error }),
+            }
+        })
+    }
+
     /// The stage of the loop in which it acts.
     pub fn stage(&self) -> Stage {
         stage_of(&self.setting)

@@ -16,6 +16,7 @@ use crate::interrupt;
 use crate::laps::{Measured, SampledRun};
 use crate::session::Session;
 use crate::setup::{self, Setup};
+use crate::table::counted;
 
 /// A measured data set with the model that it declares.
 #[derive(Debug)]
@@ -456,10 +457,9 @@ pub(super) fn observed_runs(recordings: &[&Recording]) -> Result<Vec<ObservedRun
     for ((run, file), observed) in runs.zip(files).zip(&observed) {
         ensure!(
             observed.laps.len() >= 3,
-            "{}: {} whole lap{} after the first, which is not analysed: at least 3 in every run are needed to trace anything; {}",
+            "{}: {} after the first, which is not analysed: at least 3 in every run are needed to trace anything; {}",
             file.path.display(),
-            observed.laps.len(),
-            if observed.laps.len() == 1 { "" } else { "s" },
+            counted(observed.laps.len(), "whole lap"),
             if run.wanted < 3 {
                 "raise `laps` in dataset.toml if there are more, or measure longer"
             } else {

@@ -63,13 +63,13 @@ pub fn separations(
 /// that their noise has no mean.
 fn nearest(offset: &[White; 2], moves: &[[White; 2]]) -> f64 {
     let [d1, d2] = offset;
+    if moves.is_empty() {
+        return d1.dot(d2).max(0.0).sqrt();
+    }
     let toward =
         |half: usize, d: &White| DVector::from_iterator(moves.len(), moves.iter().map(|by| by[half].dot(d)));
     let (b1, b2) = (toward(0, d2), toward(1, d1));
     let product = |i: usize, j: usize| 0.5 * (moves[i][0].dot(&moves[j][1]) + moves[i][1].dot(&moves[j][0]));
-    if moves.is_empty() {
-        return d1.dot(d2).max(0.0).sqrt();
-    }
     let along = SymmetricEigen::new(DMatrix::from_fn(moves.len(), moves.len(), product));
     let saved = along.eigenvalues.iter().zip(along.eigenvectors.column_iter());
     let saved = saved.map(|(square, axis)| axis.dot(&b1) * axis.dot(&b2) / (1.0 + square.max(0.0)));
