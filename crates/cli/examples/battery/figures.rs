@@ -97,17 +97,25 @@ pub(crate) fn figures(outcomes: &[Outcome]) -> Vec<Figure> {
         figure(
             "error after / floor on held-out runs, where effects are claimed: median, 90 %",
             "1.02, 1.06",
-            spread(&ratios(&of.all(claimed))),
+            spread(&ratios(&of.all(claimed), Outcome::after_over_floor)),
         ),
         figure(
             "the same, every set with listed effects",
             "",
-            spread(&ratios(&of.all(listed))),
+            spread(&ratios(&of.all(listed), Outcome::after_over_floor)),
+        ),
+        figure(
+            "error after / error of the true model on the same runs, where effects are claimed: median, 90 %",
+            "",
+            spread(&ratios(&of.all(claimed), Outcome::after_over_truth)),
         ),
         figure(
             "error before / floor on effect-free sets: what chance makes of such a ratio",
             "",
-            spread(&ratios(&of.all(|o| o.label.kind == Kind::Null))),
+            spread(&ratios(
+                &of.all(|o| o.label.kind == Kind::Null),
+                Outcome::after_over_floor,
+            )),
         ),
         figure(
             "places (azimuth rad, position, length m): median difference, 90 % quantile; intervals that hold the truth",
@@ -234,11 +242,8 @@ fn coverage(errors: &[ParameterError]) -> String {
     percent(errors.iter().filter(|error| error.covered).count(), errors.len())
 }
 
-fn ratios(outcomes: &[&Outcome]) -> Vec<f64> {
-    outcomes
-        .iter()
-        .filter_map(|outcome| outcome.after_over_floor())
-        .collect()
+fn ratios(outcomes: &[&Outcome], ratio: fn(&Outcome) -> Option<f64>) -> Vec<f64> {
+    outcomes.iter().filter_map(|outcome| ratio(outcome)).collect()
 }
 
 fn spread(values: &[f64]) -> String {

@@ -13,7 +13,7 @@ use toml::{Table, Value};
 use crate::classes::are_one;
 use crate::further;
 use crate::labels::{self, Controller, Kind, Label, Level, Set, Truth};
-use crate::program::Lapwing;
+use crate::program::{Drive, Lapwing};
 use crate::recipes::{BY_RUN, RECIPES, Recipe};
 use crate::robot::{self, Recording};
 use crate::undeclared;
@@ -269,7 +269,13 @@ fn made(
                 describe(table, &mut label)?;
             }
             let model = model_file(lapwing, plan.controller, tables, name)?;
-            finished(&lapwing.drive(&model, laps, plan.level == Level::L2, drive_seed, place)?)
+            let drive = Drive {
+                runs: RUNS,
+                laps,
+                log: plan.level == Level::L2,
+                seed: drive_seed,
+            };
+            finished(&lapwing.drive(&model, drive, place)?)
         };
         if finished {
             labels::write(place, std::iter::once(&label))?;
@@ -301,15 +307,14 @@ fn describe(table: &Table, label: &mut Label) -> Result<()> {
 
 /// The declared model with the effects, as a file.
 fn model_file(lapwing: &Lapwing, controller: Controller, effects: Vec<Table>, name: &str) -> Result<PathBuf> {
-    let folder = lapwing.out.join("models");
-    fs::create_dir_all(&folder)?;
+    let path = lapwing.model(name);
+    path.parent().map_or(Ok(()), fs::create_dir_all)?;
     let mut kind = Table::new();
     kind.insert("kind".into(), controller.name().into());
     let mut model = Table::new();
     model.insert("controller".into(), kind.into());
     let effects = effects.into_iter().map(Value::Table).collect();
     model.insert("effect".into(), Value::Array(effects));
-    let path = folder.join(format!("{name}.toml"));
     fs::write(&path, toml::to_string(&model)?)?;
     Ok(path)
 }

@@ -15,6 +15,7 @@ mod recipes;
 mod report;
 mod robot;
 mod score;
+mod truth;
 mod undeclared;
 
 use std::fs;
@@ -93,10 +94,12 @@ fn judged(lapwing: &Lapwing, name: &'static str, sets: Vec<Set>) -> Result<Batte
     let mut outcomes = Vec::with_capacity(count);
     for (place, set) in sets.into_iter().enumerate() {
         let (trace, timing) = lapwing.trace(&set)?;
+        let truth_m = truth::error_m(lapwing, &set)?;
         let outcome = Outcome {
             label: set.label,
             trace,
             timing,
+            truth_m,
         };
         eprintln!(
             "{name} {}/{count}, {:.0} s: {}",

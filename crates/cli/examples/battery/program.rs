@@ -30,6 +30,16 @@ pub(crate) struct Timing {
     pub(crate) build: String,
 }
 
+/// Runs to be simulated.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Drive {
+    pub(crate) runs: usize,
+    /// Of each run.
+    pub(crate) laps: usize,
+    pub(crate) log: bool,
+    pub(crate) seed: u64,
+}
+
 impl Lapwing {
     /// The binary beside this example, built anew where cargo runs us.
     ///
@@ -102,21 +112,64 @@ impl Lapwing {
         Ok((trace, timing))
     }
 
+    /// The file of the model that a fresh data set is driven with.
+    pub(crate) fn model(&self, set: &str) -> PathBuf {
+        self.out.join("models").join(format!("{set}.toml"))
+    }
+
     /// Simulates a data set with a model file.
     ///
     /// # Errors
     /// A model that the program refuses.
-    pub(crate) fn drive(&self, model: &Path, laps: usize, log: bool, seed: u64, to: &Path) -> Result<Value> {
+    pub(crate) fn drive(&self, model: &Path, drive: Drive, to: &Path) -> Result<Value> {
         let mut command = Command::new(&self.binary);
-        command
-            .arg("drive")
-            .arg(model)
-            .args(["--json", "--quiet", "--runs", "4"]);
-        command.args(["--laps", &laps.to_string(), "--seed", &seed.to_string()]);
+        command.arg("drive").arg(model).args(["--json", "--quiet"]);
+        let Drive {
+            runs,
+            laps,
+            log,
+            seed,
+        } = drive;
+        for (flag, number) in [("--runs", runs as u64), ("--laps", laps as u64), ("--seed", seed)] {
+            command.args([flag, &number.to_string()]);
+        }
         command.args(log.then_some("--log"));
-        let output = self.run(command.arg("--out").arg(to))?;
+        self.done(command.arg("--out").arg(to), model)
+    }
+
+    /// Samples the laps of a data set at the gates: tables in `TO/laps`, one for each run.
+    ///
+    /// # Errors
+    /// A data set that the program refuses.
+    pub(crate) fn sample(&self, set: &Path, to: &Path) -> Result<Value> {
+        let mut command = Command::new(&self.binary);
+        command.arg("compare").arg(set);
+        command.args(["--json", "--quiet", "--permutations", "1"]);
+        self.done(command.arg("--out").arg(to), set)
+    }
+
+    /// A number that is kept with the answers, made in a folder for what comes and goes if it is not there yet.
+    ///
+    /// # Errors
+    /// Those of making it, and a file that cannot be read or written.
+    pub(crate) fn kept(&self, name: &str, make: impl FnOnce(&Path) -> Result<f64>) -> Result<f64> {
+        let kept = self.out.join("traces").join(format!("{name}.json"));
+        if kept.exists() {
+            return Ok(serde_json::from_value(read_json(&kept)?)?);
+        }
+        let work = self.out.join("work").join(name);
+        fs::create_dir_all(&work).with_context(|| format!("{}: cannot be made", work.display()))?;
+        let number = make(&work)?;
+        write_whole(&kept, &serde_json::to_string(&number)?)?;
+        fs::remove_dir_all(&work).with_context(|| format!("{}: cannot be removed", work.display()))?;
+        Ok(number)
+    }
+
+    /// What a command that is done with a file or folder prints as JSON.
+    fn done(&self, command: &mut Command, with: &Path) -> Result<Value> {
+        let output = self.run(command)?;
         let message = String::from_utf8_lossy(&output.stderr);
-        ensure!(output.status.success(), "{}: {}", model.display(), message.trim());
+        ensure!(output.status.success(), "{}: {}", with.display(), message.trim());
         Ok(serde_json::from_slice(&output.stdout)?)
     }
 

@@ -149,7 +149,7 @@ fn listed(text: &mut String, title: &str, outcomes: &[Outcome], which: impl Fn(&
 /// # Errors
 /// A file that cannot be written.
 pub(crate) fn write_csv(path: &Path, batteries: &[Battery]) -> Result<()> {
-    const COLUMNS: [&str; 26] = [
+    const COLUMNS: [&str; 27] = [
         "battery",
         "set",
         "level",
@@ -172,6 +172,7 @@ pub(crate) fn write_csv(path: &Path, batteries: &[Battery]) -> Result<()> {
         "before_m",
         "after_m",
         "floor_m",
+        "truth_m",
         "seconds",
         "mean_lap_rms",
         "two_modes",
@@ -187,8 +188,13 @@ pub(crate) fn write_csv(path: &Path, batteries: &[Battery]) -> Result<()> {
     Ok(writer.flush()?)
 }
 
-fn row(battery: &str, outcome: &Outcome) -> [String; 26] {
-    let Outcome { label, trace, timing } = outcome;
+fn row(battery: &str, outcome: &Outcome) -> [String; 27] {
+    let Outcome {
+        label,
+        trace,
+        timing,
+        truth_m,
+    } = outcome;
     let first = trace.effects.first();
     let number = |value: Option<f64>| value.map_or_else(String::new, |value| format!("{value:.6}"));
     let first_of = |names: fn(&crate::score::Baselines) -> &Vec<String>| {
@@ -230,6 +236,7 @@ fn row(battery: &str, outcome: &Outcome) -> [String; 26] {
         number(trace.error.before),
         number(trace.error.after),
         number(trace.error.floor),
+        number(*truth_m),
         format!("{:.2}", timing.seconds),
         first_of(|baselines| &baselines.mean_lap_rms),
         first_of(|baselines| &baselines.two_modes),

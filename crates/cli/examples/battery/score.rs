@@ -108,6 +108,8 @@ pub(crate) struct Outcome {
     pub(crate) label: Label,
     pub(crate) trace: Trace,
     pub(crate) timing: Timing,
+    /// Error of the true model on the same runs, m, where that is known.
+    pub(crate) truth_m: Option<f64>,
 }
 
 impl Outcome {
@@ -255,6 +257,11 @@ impl Outcome {
     pub(crate) fn after_over_floor(&self) -> Option<f64> {
         let ratio = self.trace.error.after? / self.trace.error.floor?;
         ratio.is_finite().then_some(ratio)
+    }
+
+    /// Error after over that of the true model on the same runs: what chance does to a run it does to both.
+    pub(crate) fn after_over_truth(&self) -> Option<f64> {
+        Some(self.trace.error.after? / self.truth_m?)
     }
 
     /// Where a simpler way puts the truth: right by name, right by class.

@@ -21,6 +21,7 @@ fn outcome(kind: Kind, effects: &[&str], stages: &[&str], document: Value) -> Ou
             seconds: 1.0,
             build: String::new(),
         },
+        truth_m: Some(0.0004),
     }
 }
 
@@ -137,4 +138,14 @@ fn a_set_that_could_not_be_traced_is_wrong() {
     assert!(set.right());
     set.trace = Trace::failed("bad file");
     assert!(!set.right() && set.first().is_none() && set.after_over_floor().is_none());
+}
+
+#[test]
+fn an_error_is_held_against_that_of_the_true_model() {
+    let answer =
+        json!({"verdict": "explained", "error": {"before": 0.002, "after": 0.0005, "floor": 0.0004}});
+    let mut found = outcome(Kind::Single, &["reading-gain"], &["sense"], answer);
+    assert_eq!(found.after_over_truth(), Some(1.25));
+    found.truth_m = None;
+    assert_eq!(found.after_over_truth(), None);
 }

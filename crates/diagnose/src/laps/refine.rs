@@ -283,7 +283,7 @@ impl Trial<'_> {
             Round::Rough => false,
             // A place is not found on one parabola, nor a far one on two.
             Round::Again => !has_place || descent.holds && descent.looks > 1,
-            Round::Full => descent.knows_its_slopes() && (!has_place || descent.looks > 2),
+            Round::Full => descent.knows_its_slopes() && (!has_place || descent.looks > 1),
         };
         if again && descent.near.is_some() {
             self.look_again(descent, round)
@@ -367,7 +367,8 @@ impl Trial<'_> {
         let hypothesis = self.atlas.with_moves(&hypothesis, &freedoms, &moves);
         let found = full && is_settled(&moves, &nearest.covariance, &freedoms);
         let holds = are_within_steps(&moves, &freedoms);
-        let remainder = full.then(|| Departures::new(&nearest.fit.residual, &self.atlas.layout));
+        let remainder =
+            (round != Round::Rough).then(|| Departures::new(&nearest.fit.residual, &self.atlas.layout));
         for (i, freedom) in freedoms.iter_mut().enumerate() {
             // The parabola should hold where the answer may lie, and be wide enough for the noise of its points not to
             // pass for information.
