@@ -98,7 +98,7 @@ pub(super) struct Descent {
     pub(super) score_error: f64,
     /// By how much the last round raised the score.
     pub(super) progress: f64,
-    /// What it leaves, as the last round but a rough one saw it.
+    /// What it leaves, if the last round tells: neither does a rough one, nor one that looks around several numbers with few data sets.
     pub(super) remainder: Option<Departures>,
     /// What was seen about it, and the moves since.
     near: Option<(Local, DVector<f64>)>,
@@ -281,7 +281,7 @@ impl Trial<'_> {
         let has_place = descent.hypothesis.has_place(self.atlas);
         let again = match round {
             Round::Rough => false,
-            // A place is not found on one parabola, nor a far one on two.
+            // A place is not found on one parabola, nor where it moved beyond the steps of the last.
             Round::Again => !has_place || descent.holds && descent.looks > 1,
             Round::Full => descent.knows_its_slopes() && (!has_place || descent.looks > 1),
         };
@@ -367,8 +367,7 @@ impl Trial<'_> {
         let hypothesis = self.atlas.with_moves(&hypothesis, &freedoms, &moves);
         let found = full && is_settled(&moves, &nearest.covariance, &freedoms);
         let holds = are_within_steps(&moves, &freedoms);
-        let remainder =
-            (round != Round::Rough).then(|| Departures::new(&nearest.fit.residual, &self.atlas.layout));
+        let remainder = full.then(|| Departures::new(&nearest.fit.residual, &self.atlas.layout));
         for (i, freedom) in freedoms.iter_mut().enumerate() {
             // The parabola should hold where the answer may lie, and be wide enough for the noise of its points not to
             // pass for information.
