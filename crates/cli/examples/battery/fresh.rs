@@ -3,7 +3,7 @@
 //! They come from the simulator that the answers come from, so they judge the method and not the simulator.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use anyhow::{Context, Result, bail};
 use serde_json::Value as Json;
@@ -268,7 +268,7 @@ fn made(
             for table in &tables {
                 describe(table, &mut label)?;
             }
-            let model = model_file(lapwing, plan.controller, tables, name)?;
+            let model = lapwing.model_file(plan.controller, tables, name)?;
             let drive = Drive {
                 runs: RUNS,
                 laps,
@@ -303,20 +303,6 @@ fn describe(table: &Table, label: &mut Label) -> Result<()> {
         label.parameters.push((key.clone(), truth));
     }
     Ok(())
-}
-
-/// The declared model with the effects, as a file.
-fn model_file(lapwing: &Lapwing, controller: Controller, effects: Vec<Table>, name: &str) -> Result<PathBuf> {
-    let path = lapwing.model(name);
-    path.parent().map_or(Ok(()), fs::create_dir_all)?;
-    let mut kind = Table::new();
-    kind.insert("kind".into(), controller.name().into());
-    let mut model = Table::new();
-    model.insert("controller".into(), kind.into());
-    let effects = effects.into_iter().map(Value::Table).collect();
-    model.insert("effect".into(), Value::Array(effects));
-    fs::write(&path, toml::to_string(&model)?)?;
-    Ok(path)
 }
 
 /// Whether every run has all its laps.

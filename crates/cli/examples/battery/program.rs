@@ -10,8 +10,9 @@ use anyhow::{Context, Result, ensure};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use sha2::{Digest, Sha256};
+use toml::Table;
 
-use crate::labels::Set;
+use crate::labels::{Controller, Set};
 use crate::score::Trace;
 
 /// The binary, and the folder that everything goes to.
@@ -112,9 +113,27 @@ impl Lapwing {
         Ok((trace, timing))
     }
 
-    /// The file of the model that a fresh data set is driven with.
-    pub(crate) fn model(&self, set: &str) -> PathBuf {
-        self.out.join("models").join(format!("{set}.toml"))
+    /// The declared model with the effects of a data set, as a file.
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    pub(crate) fn model_file(
+        &self,
+        controller: Controller,
+        effects: Vec<Table>,
+        set: &str,
+    ) -> Result<PathBuf> {
+        let folder = self.out.join("models");
+        fs::create_dir_all(&folder).with_context(|| format!("{}: cannot be made", folder.display()))?;
+        let mut kind = Table::new();
+        kind.insert("kind".into(), controller.name().into());
+        let mut model = Table::new();
+        model.insert("controller".into(), kind.into());
+        let effects = effects.into_iter().map(toml::Value::Table).collect();
+        model.insert("effect".into(), toml::Value::Array(effects));
+        let path = folder.join(format!("{set}.toml"));
+        fs::write(&path, toml::to_string(&model)?)?;
+        Ok(path)
     }
 
     /// Simulates a data set with a model file.
