@@ -159,13 +159,14 @@ impl Search<'_> {
         })
     }
 
-    /// Whether the best leaves so little of a strong signal that an effect that jumps does not stand for either of its own.
+    /// Whether the best leaves so little of a strong signal, and not far too much for chance, that an effect that jumps does not stand for
+    /// either of its own.
     fn explains_most(&self, tried: &Tried) -> bool {
         const LITTLE: f64 = 0.1;
         let all = self.excess(self.residual);
         let left = |best: &Descent| best.remainder.map(|left| left.excess());
         best_of(&tried.descents)
-            .filter(|best| best.score > STRONG)
+            .filter(|best| best.score > STRONG && !best.leaves_far_too_much())
             .and_then(left)
             .is_some_and(|left| left < LITTLE * all)
     }
