@@ -27,7 +27,7 @@ pub use log::{
     Channel, Decided, Implausible, LogDiagnosis, LogRow, LoggedRun, Spoilt, can_be_followed, diagnose_logs,
     log_separation, take_out_implausible,
 };
-pub use mean_laps::{MeanLaps, mean_lap};
+pub use mean_laps::{MeanLaps, mean_lap, rms};
 pub use outlying::{far, median};
 pub use response_fit::{Estimate, ResponseFit};
 pub use sightings::{

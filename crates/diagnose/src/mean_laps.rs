@@ -116,7 +116,8 @@ fn mean<'a>(values: impl IntoIterator<Item = &'a f64>) -> f64 {
     sum / count
 }
 
-fn rms(a: &[f64], b: &[f64]) -> f64 {
+/// The root mean square of what two laps differ by, gate by gate.
+pub fn rms(a: &[f64], b: &[f64]) -> f64 {
     (a.iter().zip(b).map(|(x, y)| (x - y) * (x - y)).sum::<f64>() / a.len() as f64).sqrt()
 }
 

@@ -79,7 +79,7 @@ impl Lapwing {
     /// A file that cannot be read or written.
     pub(crate) fn trace(&self, set: &Set) -> Result<(Trace, Timing)> {
         let name = &set.label.name;
-        let kept = self.out.join("traces").join(format!("{name}.json"));
+        let kept = self.kept_file(name);
         let timed = kept.with_extension("timing.json");
         if kept.exists() {
             return Ok((
@@ -87,7 +87,7 @@ impl Lapwing {
                 serde_json::from_value(read_json(&timed)?)?,
             ));
         }
-        let work = self.out.join("work").join(name);
+        let work = self.work_folder(name);
         let start = Instant::now();
         let mut command = Command::new(&self.binary);
         command.args(["trace", "roduit2007", "--json", "--quiet", "--set"]);
@@ -108,8 +108,7 @@ impl Lapwing {
             serde_json::from_slice(&output.stdout).with_context(|| format!("{name}: no JSON on stdout"))?;
         let trace = Trace::new(&document).with_context(|| format!("{name}: not as trace.json should be"))?;
         fs::write(&timed, serde_json::to_string(&timing)?)?;
-        write_whole(&kept, &format!("{document:#}\n"))?;
-        fs::remove_dir_all(&work).with_context(|| format!("{}: cannot be removed", work.display()))?;
+        keep(&kept, &format!("{document:#}\n"), &work)?;
         Ok((trace, timing))
     }
 
@@ -153,18 +152,20 @@ impl Lapwing {
             command.args([flag, &number.to_string()]);
         }
         command.args(log.then_some("--log"));
-        self.done(command.arg("--out").arg(to), model)
+        let output = self.done(command.arg("--out").arg(to), model)?;
+        Ok(serde_json::from_slice(&output.stdout)?)
     }
 
     /// Samples the laps of a data set at the gates: tables in `TO/laps`, one for each run.
     ///
     /// # Errors
     /// A data set that the program refuses.
-    pub(crate) fn sample(&self, set: &Path, to: &Path) -> Result<Value> {
+    pub(crate) fn sample(&self, set: &Path, to: &Path) -> Result<()> {
         let mut command = Command::new(&self.binary);
         command.arg("compare").arg(set);
-        command.args(["--json", "--quiet", "--permutations", "1"]);
-        self.done(command.arg("--out").arg(to), set)
+        command.args(["--quiet", "--permutations", "0"]);
+        self.done(command.arg("--out").arg(to), set)?;
+        Ok(())
     }
 
     /// A number that is kept with the answers, made in a folder for what comes and goes if it is not there yet.
@@ -172,24 +173,33 @@ impl Lapwing {
     /// # Errors
     /// Those of making it, and a file that cannot be read or written.
     pub(crate) fn kept(&self, name: &str, make: impl FnOnce(&Path) -> Result<f64>) -> Result<f64> {
-        let kept = self.out.join("traces").join(format!("{name}.json"));
+        let kept = self.kept_file(name);
         if kept.exists() {
             return Ok(serde_json::from_value(read_json(&kept)?)?);
         }
-        let work = self.out.join("work").join(name);
+        let work = self.work_folder(name);
         fs::create_dir_all(&work).with_context(|| format!("{}: cannot be made", work.display()))?;
         let number = make(&work)?;
-        write_whole(&kept, &serde_json::to_string(&number)?)?;
-        fs::remove_dir_all(&work).with_context(|| format!("{}: cannot be removed", work.display()))?;
+        keep(&kept, &serde_json::to_string(&number)?, &work)?;
         Ok(number)
     }
 
-    /// What a command that is done with a file or folder prints as JSON.
-    fn done(&self, command: &mut Command, with: &Path) -> Result<Value> {
+    /// What a command prints that is to succeed with a file or folder.
+    fn done(&self, command: &mut Command, with: &Path) -> Result<Output> {
         let output = self.run(command)?;
         let message = String::from_utf8_lossy(&output.stderr);
         ensure!(output.status.success(), "{}: {}", with.display(), message.trim());
-        Ok(serde_json::from_slice(&output.stdout)?)
+        Ok(output)
+    }
+
+    /// Where what is known of a data set is kept.
+    fn kept_file(&self, name: &str) -> PathBuf {
+        self.out.join("traces").join(format!("{name}.json"))
+    }
+
+    /// The folder for what comes and goes until then.
+    fn work_folder(&self, name: &str) -> PathBuf {
+        self.out.join("work").join(name)
     }
 
     fn run(&self, command: &mut Command) -> Result<Output> {
@@ -211,9 +221,10 @@ fn read_json(path: &Path) -> Result<Value> {
     serde_json::from_str(&text).with_context(|| format!("{shown}: no JSON"))
 }
 
-/// A file that is there whole or not at all.
-fn write_whole(path: &Path, text: &str) -> Result<()> {
+/// Writes a file, which is there whole or not at all, and removes the folder that it came of.
+fn keep(path: &Path, text: &str, work: &Path) -> Result<()> {
     let partial = path.with_extension("partial");
     fs::write(&partial, text)?;
-    Ok(fs::rename(&partial, path)?)
+    fs::rename(&partial, path)?;
+    fs::remove_dir_all(work).with_context(|| format!("{}: cannot be removed", work.display()))
 }

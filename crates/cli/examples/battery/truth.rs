@@ -5,6 +5,7 @@ use std::path::Path;
 
 use anyhow::{Context, Result};
 use csv::Reader;
+use diagnose::{mean_lap, rms};
 use toml::{Table, Value};
 
 use crate::labels::{Label, Set, Truth};
@@ -35,10 +36,10 @@ pub(crate) fn error_m(lapwing: &Lapwing, set: &Set) -> Result<Option<f64>> {
         lapwing.drive(&model, LAPS, &driven)?;
         lapwing.sample(&driven, &simulated)?;
         lapwing.sample(&set.folder, &measured)?;
-        let all: Vec<Vec<f64>> = runs_of(&simulated)?.into_iter().flatten().collect();
-        let expected_m = mean_lap(&all);
+        let simulated = runs_of(&simulated)?;
+        let expected_m = mean_lap(simulated.iter().flatten()).context("the true model drives laps")?;
         let errors_m: Vec<f64> = (runs_of(&measured)?.iter())
-            .map(|run| rms(&expected_m, &mean_lap(run)))
+            .filter_map(|run| Some(rms(&expected_m, &mean_lap(run)?)))
             .collect();
         Ok(errors_m.iter().sum::<f64>() / errors_m.len() as f64)
     });
@@ -72,40 +73,16 @@ fn effects(label: &Label) -> Option<Vec<Table>> {
     parameters.next().is_none().then_some(tables)
 }
 
-/// Laps, run by run, as lateral positions at the gates, m; NaN at a gate that a lap missed.
-fn runs_of(compared: &Path) -> Result<Vec<Vec<Vec<f64>>>> {
-    let folder = compared.join("laps");
+/// Sampled laps, run by run, as lateral positions at the gates, m.
+fn runs_of(sampled: &Path) -> Result<Vec<Vec<Vec<f64>>>> {
+    let folder = sampled.join("laps");
     let shown = folder.display();
     let mut runs = Vec::new();
     for entry in fs::read_dir(&folder).with_context(|| format!("{shown}: cannot be read"))? {
         let mut reader = Reader::from_path(entry?.path())?;
-        let gates = (reader.headers()?.iter())
-            .filter(|name| name.starts_with("gate_"))
-            .count();
-        let laps = reader.records().map(|record| {
-            let position = |field: &str| field.parse().unwrap_or(f64::NAN);
-            Ok(record?.iter().take(gates).map(position).collect())
-        });
-        runs.push(laps.collect::<Result<_, csv::Error>>()?);
+        runs.push(reader.deserialize().collect::<Result<_, csv::Error>>()?);
     }
     Ok(runs)
-}
-
-/// Gate by gate the mean of the laps that did not miss it.
-fn mean_lap(laps: &[Vec<f64>]) -> Vec<f64> {
-    let gates = laps.first().map_or(0, Vec::len);
-    let mean = |gate: usize| {
-        let known: Vec<f64> = (laps.iter().map(|lap| lap[gate]))
-            .filter(|x| x.is_finite())
-            .collect();
-        known.iter().sum::<f64>() / known.len() as f64
-    };
-    (0..gates).map(mean).collect()
-}
-
-fn rms(a: &[f64], b: &[f64]) -> f64 {
-    let sum: f64 = a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum();
-    (sum / a.len() as f64).sqrt()
 }
 
 #[cfg(test)]
@@ -140,21 +117,14 @@ mod tests {
     }
 
     #[test]
-    fn a_gate_that_a_lap_missed_does_not_count() {
-        let laps = [vec![1.0, 2.0], vec![3.0, f64::NAN]];
-        assert_eq!(mean_lap(&laps), [2.0, 2.0]);
-        assert_eq!(rms(&[2.0, 2.0], &[5.0, 6.0]), 12.5_f64.sqrt());
-    }
-
-    #[test]
     fn runs_are_read_from_tables_of_laps() {
         let folder = tempfile::tempdir().unwrap();
         fs::create_dir(folder.path().join("laps")).unwrap();
-        let table = "gate_0,gate_1,time_s\n0.1,0.2,3\n0.3,,4\n";
-        fs::write(folder.path().join("laps/x_a.csv"), table).unwrap();
-        let runs = runs_of(folder.path()).unwrap();
-        assert_eq!(runs.len(), 1);
-        assert_eq!(runs[0][0], [0.1, 0.2]);
-        assert!(runs[0][1][0] == 0.3 && runs[0][1][1].is_nan());
+        let table = "gate_0,gate_1\n0.1,0.2\n0.3,0.4\n";
+        let file = folder.path().join("laps/x_a.csv");
+        fs::write(&file, table).unwrap();
+        assert_eq!(runs_of(folder.path()).unwrap(), [[[0.1, 0.2], [0.3, 0.4]]]);
+        fs::write(&file, table.replace("0.4", "")).unwrap();
+        assert!(runs_of(folder.path()).is_err());
     }
 }

@@ -278,12 +278,12 @@ impl Trial<'_> {
         if descent.rests {
             return self.weigh(descent, round);
         }
-        let has_place = descent.hypothesis.has_place(self.atlas);
+        // A place is not found on one parabola, nor where it moved beyond the steps of the last.
+        let knows_its_place = !descent.hypothesis.has_place(self.atlas) || descent.holds && descent.looks > 1;
         let again = match round {
             Round::Rough => false,
-            // A place is not found on one parabola, nor where it moved beyond the steps of the last.
-            Round::Again => !has_place || descent.holds && descent.looks > 1,
-            Round::Full => descent.knows_its_slopes() && (!has_place || descent.looks > 1),
+            Round::Again => knows_its_place,
+            Round::Full => knows_its_place && descent.knows_its_slopes(),
         };
         if again && descent.near.is_some() {
             self.look_again(descent, round)
