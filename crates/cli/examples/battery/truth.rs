@@ -6,6 +6,7 @@ use std::path::Path;
 use anyhow::{Context, Result};
 use csv::Reader;
 use diagnose::{mean_lap, rms};
+use sim::Spec;
 use toml::{Table, Value};
 
 use crate::labels::{Label, Set, Truth};
@@ -46,31 +47,47 @@ pub(crate) fn error_m(lapwing: &Lapwing, set: &Set) -> Result<Option<f64>> {
     error_m.map(Some)
 }
 
-/// The effects of a label as a model file has them; `None` where one has no name, another program may mean something else by it, or
-/// its size goes by run.
+/// The effects of a label as a model file has them; `None` where one has no name, another program may mean something else by it, its
+/// size goes by run, or it is not clear which of them a parameter belongs to.
 fn effects(label: &Label) -> Option<Vec<Table>> {
-    let mut parameters = label.parameters.iter().peekable();
-    let mut tables = Vec::new();
-    for name in &label.effects {
-        let spec = sim::find(name).ok().filter(|_| comparable(name))?;
-        let mut table = Table::new();
-        table.insert("kind".into(), name.as_str().into());
-        while let Some((key, truth)) = parameters.peek()
-            && let Some(param) = spec.params.iter().find(|param| param.name == key)
-            && !table.contains_key(key)
-        {
-            let value = match truth {
-                Truth::Number(number) if param.whole => Value::Integer(*number as i64),
-                Truth::Number(number) => Value::Float(*number),
-                Truth::Word(word) => Value::String(word.clone()),
-                Truth::ByRun(_) => return None,
-            };
-            table.insert(key.clone(), value);
-            parameters.next();
+    let specs = (label.effects.iter()).map(|name| sim::find(name).ok().filter(|_| comparable(name)));
+    let specs: Vec<&Spec> = specs.collect::<Option<_>>()?;
+    let mut ways = shared_out(&specs, &label.parameters);
+    ways.pop().filter(|_| ways.is_empty())
+}
+
+/// Every way in which effects may have the parameters, in their order and at least one each.
+fn shared_out(specs: &[&Spec], parameters: &[(String, Truth)]) -> Vec<Vec<Table>> {
+    let Some((spec, others)) = specs.split_first() else {
+        return Vec::from_iter(parameters.is_empty().then(Vec::new));
+    };
+    let mut ways = Vec::new();
+    for count in 1..=parameters.len() {
+        let (own, rest) = parameters.split_at(count);
+        let Some(first) = effect(spec, own) else { break };
+        for others in shared_out(others, rest) {
+            ways.push([vec![first.clone()], others].concat());
         }
-        tables.push(table);
     }
-    parameters.next().is_none().then_some(tables)
+    ways
+}
+
+/// An effect with these parameters; `None` where it lacks one of them, or one goes by run.
+fn effect(spec: &Spec, parameters: &[(String, Truth)]) -> Option<Table> {
+    let mut table = Table::from_iter([("kind".to_owned(), spec.name.into())]);
+    for (key, truth) in parameters {
+        let param = spec.params.iter().find(|param| param.name == key)?;
+        let value = match truth {
+            Truth::Number(number) if param.whole => Value::Integer(*number as i64),
+            Truth::Number(number) => Value::Float(*number),
+            Truth::Word(word) => Value::String(word.clone()),
+            Truth::ByRun(_) => return None,
+        };
+        if table.insert(key.clone(), value).is_some() {
+            return None;
+        }
+    }
+    Some(table)
 }
 
 /// Sampled laps, run by run, as lateral positions at the gates, m.
@@ -107,7 +124,23 @@ mod tests {
         let [slip, gain] = ["kind = \"slip-level\"", "kind = \"one-sensor-gain\""];
         let expected = format!("factor = 2.0\n{slip}\ngain = 0.7\n{gain}\nsensor = 5\n");
         assert_eq!(effects(&label).map(model), Some(expected));
-        // Of nothing, of what no effect has, of what goes by run, of what is defined in words.
+        // Both have an angle, and the first one another number before it.
+        label.effects = vec!["marker-offset".into(), "sensor-rotation".into()];
+        label.parameters = vec![number("forward_m", 0.01), number("angle_rad", 0.06)];
+        let [marker, rotation] = ["kind = \"marker-offset\"", "kind = \"sensor-rotation\""];
+        let expected = format!("forward_m = 0.01\n{marker}\nangle_rad = 0.06\n{rotation}\n");
+        assert_eq!(effects(&label).map(model), Some(expected));
+        // Of two markers it is not clear whose the second number is.
+        label.effects[1] = "marker-offset".into();
+        label.parameters = vec![
+            number("left_m", 0.01),
+            number("forward_m", 0.01),
+            number("angle_rad", 0.06),
+        ];
+        assert_eq!(effects(&label), None);
+        label.effects = vec!["slip-level".into(), "one-sensor-gain".into()];
+        label.parameters = vec![number("factor", 2.0), number("sensor", 5.0), number("gain", 0.7)];
+        // Of what no effect has, of what goes by run, of what is defined in words.
         label.parameters.push(number("gain", 0.7));
         assert_eq!(effects(&label), None);
         label.parameters = vec![("factor".into(), Truth::ByRun(vec![1.0, 2.0]))];

@@ -13,6 +13,10 @@ use super::trial::Trial;
 
 /// Data sets simulated at each size, at one spacing after the other.
 const CLOSER: [u64; 4] = [3, 4, 8, 8];
+/// By how much one spacing is smaller than the one before.
+const CLOSER_BY: f64 = 3.0;
+/// Share of the data sets by which all sizes are looked at.
+const FIRST: u64 = 4;
 
 /// A size of a probe that jumps about which a better one is to be found.
 #[derive(Debug, Clone)]
@@ -51,6 +55,11 @@ impl Hunt {
     /// The same where a scan saw what it leaves.
     pub(super) fn leaving(self, left: f64) -> Self {
         Self { left, ..self }
+    }
+
+    /// How far to either side sizes are looked at.
+    fn reach(&self) -> f64 {
+        4.0 * self.spacing / CLOSER_BY
     }
 
     /// Hunts, what leaves least first.
@@ -94,7 +103,8 @@ impl Trial<'_> {
     /// A hunt after one look closer.
     pub(super) fn hunted_once(&self, mut hunt: Hunt) -> Option<Hunt> {
         let sets = CLOSER[hunt.looks];
-        self.look_closer(&mut hunt, sets)?;
+        let first = self.looks_about(&hunt, sets);
+        self.race(&mut hunt, first, sets)?;
         Some(hunt)
     }
 
@@ -135,7 +145,7 @@ impl Trial<'_> {
             hunt.base = hunt.base.in_units_of(own.clone());
             let distances = |sizes: &[f64]| {
                 const SETS: u64 = 6;
-                self.distances(&hunt, sizes, SETS)
+                squares(&self.looks_of(&hunt, sizes, SETS))
             };
             if let Some((size, error)) = smooth_size(distances, hunt.size, hunt.spacing) {
                 smooth.parts[i] = Part::held(self.atlas, hunt.probe, size, error);
@@ -161,12 +171,16 @@ impl Trial<'_> {
         Some(found)
     }
 
-    /// The best of sizes ever closer about a hunt's, with so many data sets from level to level.
+    /// The best of sizes ever closer about a hunt's, with so many data sets from level to level, until they tell the vertex of a parabola.
     fn hunt_closer(&self, mut hunt: Hunt, levels: &[u64]) -> Option<Part> {
         let mut last = Vec::new();
         for &sets in levels {
             let before = hunt.left;
-            last = self.look_closer(&mut hunt, sets)?;
+            let first = self.looks_about(&hunt, sets);
+            if let Some(vertex) = sharp_vertex(&first, &hunt) {
+                return Some(Part::held(self.atlas, hunt.probe, vertex.size, vertex.error));
+            }
+            last = self.race(&mut hunt, first, sets)?;
             if self.is_in_vain(before, hunt.left) {
                 break;
             }
@@ -192,42 +206,39 @@ impl Trial<'_> {
         beyond > FAR * chance && before - left < SLOW * beyond
     }
 
-    /// Brings a hunt to the best of sizes about its own, with so many data sets at each; what these leave of the data.
-    fn look_closer(&self, hunt: &mut Hunt, sets: u64) -> Option<Vec<(f64, f64)>> {
+    /// What sizes about a hunt's leave, as a first few of so many data sets tell it.
+    fn looks_about(&self, hunt: &Hunt, sets: u64) -> Vec<Look> {
         let sizes: Vec<f64> = (-4..=4)
-            .map(|i| hunt.size + hunt.spacing * f64::from(i) / 3.0)
+            .map(|i| hunt.size + hunt.reach() * f64::from(i) / 4.0)
             .collect();
-        let found = self.least_distances(hunt, sizes, sets);
+        self.looks_of(hunt, &sizes, sets.div_ceil(FIRST))
+    }
+
+    /// Brings a hunt to the best of sizes at which it looked first, with so many data sets at those that may be it; what these leave of
+    /// the data. Ever fewer sizes are looked at by ever more data sets (a race, Maron and Moore 1994).
+    fn race(&self, hunt: &mut Hunt, first: Vec<Look>, sets: u64) -> Option<Vec<(f64, f64)>> {
+        let (mut looks, mut done) = (first, sets.div_ceil(FIRST));
+        while done < sets {
+            let left: Vec<&White> = looks.iter().map(|look| &look.left[0]).collect();
+            let may = may_be_least(&left, 1.0 / done as f64);
+            let sizes: Vec<f64> = (looks.iter().zip(may))
+                .filter(|(_, may)| *may)
+                .map(|(look, _)| look.size)
+                .collect();
+            done = (2 * done).min(sets);
+            looks = self.looks_of(hunt, &sizes, done);
+        }
+        let found = squares(&looks);
         (hunt.left, hunt.size) = least(&found)?;
-        hunt.spacing /= 3.0;
+        hunt.spacing /= CLOSER_BY;
         hunt.looks += 1;
         Some(found)
     }
 
-    /// Squared distances of those sizes that may leave least, by so many data sets: ever fewer sizes are looked at by ever more of them
-    /// (a race, Maron and Moore 1994).
-    fn least_distances(&self, hunt: &Hunt, mut sizes: Vec<f64>, sets: u64) -> Vec<(f64, f64)> {
-        /// Share of the data sets by which all sizes are looked at.
-        const FIRST: u64 = 4;
-        let mut done = sets.div_ceil(FIRST);
-        loop {
-            let found = self.distances(hunt, &sizes, done);
-            let Some((lowest, _)) = least(&found).filter(|_| done < sets) else {
-                return found;
-            };
-            let bound = may_be_least(lowest, 1.0 / done as f64);
-            sizes = (found.iter().filter(|found| found.0 <= bound))
-                .map(|found| found.1)
-                .collect();
-            done = (2 * done).min(sets);
-        }
-    }
-
-    /// Squared distances that a hunt leaves at some sizes, each with its size, by so many data sets.
-    fn distances(&self, hunt: &Hunt, sizes: &[f64], sets: u64) -> Vec<(f64, f64)> {
+    /// What a hunt leaves at some sizes, by so many data sets.
+    fn looks_of(&self, hunt: &Hunt, sizes: &[f64], sets: u64) -> Vec<Look> {
         let draws = Draws::Sets(0..sets);
-        let looks = self.looks(&hunt.base, hunt.probe, sizes, &[draws.clone(), draws]);
-        looks.iter().map(|look| (look.square(), look.size)).collect()
+        self.looks(&hunt.base, hunt.probe, sizes, &[draws.clone(), draws])
     }
 
     /// What a hypothesis with a probe beside it leaves of the data at some sizes; those at which the robot crashes are left out.
@@ -248,15 +259,16 @@ impl Trial<'_> {
         let first: Vec<(f64, White)> = (sizes.par_iter())
             .filter_map(|&size| Some((size, left(size, &draws[0])?)))
             .collect();
-        let squares = first.iter().map(|(_, left)| left.norm_squared());
         let runs = self.atlas.layout.laps.iter().map(Vec::len).max();
-        let bound = may_be_least(
-            squares.fold(f64::INFINITY, f64::min),
+        let may = may_be_least(
+            &first.iter().map(|(_, left)| left).collect::<Vec<_>>(),
             draws[0].error(runs.unwrap_or(1)),
         );
-        (first.into_par_iter())
-            .filter(|(_, left)| left.norm_squared() <= bound)
-            .filter_map(|(size, first)| {
+        (first.into_par_iter().zip(may))
+            .filter_map(|((size, first), may)| {
+                if !may {
+                    return None;
+                }
                 let left = [first, left(size, &draws[1])?];
                 Some(Look { size, left })
             })
@@ -304,11 +316,44 @@ impl Atlas {
     }
 }
 
-/// How large a squared distance may be of what leaves least once more is simulated, where the least so far is this and was simulated
-/// with such a variance.
-fn may_be_least(lowest: f64, error: f64) -> f64 {
+/// Which of several may leave least once more is simulated, by what they leave so far, which simulations of such a variance tell: they
+/// have the same draws, whose noise is no more than what each leaves otherwise than the least so far.
+fn may_be_least(left: &[&White], error: f64) -> Vec<bool> {
     const ERRORS: f64 = 3.0;
-    lowest + ERRORS * 2.0 * (lowest * error).sqrt()
+    let Some(least) = left
+        .iter()
+        .min_by(|a, b| a.norm_squared().total_cmp(&b.norm_squared()))
+    else {
+        return Vec::new();
+    };
+    let lowest = least.norm_squared();
+    let noise = (least.len() as f64 * error).sqrt();
+    let scale = (lowest / least.len() as f64).sqrt();
+    let bound = |left: &White| lowest + ERRORS * 2.0 * scale * noise.min((left - *least).norm());
+    left.iter()
+        .map(|left| left.norm_squared() <= bound(left))
+        .collect()
+}
+
+/// Squared distances, each with its size.
+fn squares(looks: &[Look]) -> Vec<(f64, f64)> {
+    looks.iter().map(|look| (look.square(), look.size)).collect()
+}
+
+/// The vertex of a parabola through what sizes about a hunt's leave, if it costs less than a size one standard error aside, and is
+/// surely between them: the least of rough distances costs more.
+fn sharp_vertex(looks: &[Look], hunt: &Hunt) -> Option<Vertex> {
+    /// Squared distance that the roughness may cost.
+    const COST: f64 = 1.0;
+    /// Share of the reach within which the vertex lies.
+    const WITHIN: f64 = 0.75;
+    const SIZES: usize = 9;
+    if looks.len() < SIZES {
+        return None;
+    }
+    let vertex = vertex(&squares(looks), hunt.size, hunt.reach())?;
+    let is_sharp = vertex.cost < COST && (vertex.size - hunt.size).abs() < WITHIN * hunt.reach();
+    is_sharp.then_some(vertex)
 }
 
 /// The least of some distances, with its size.
@@ -371,6 +416,8 @@ struct Vertex {
     error: f64,
     /// How far they do: the root of their mean square.
     roughness: f64,
+    /// By how much, on average, the vertex is off for that, in squared distance.
+    cost: f64,
 }
 
 /// The vertex of the parabola nearest to squared distances at sizes about a middle; `None` where it bends down.
@@ -391,12 +438,14 @@ fn vertex(found: &[(f64, f64)], middle: f64, reach: f64) -> Option<Vertex> {
         size: middle + reach * vertex,
         error: reach * (1.0 / bend + rough).sqrt(),
         roughness: off.sqrt(),
+        cost: bend * rough,
     })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::laps::testing::atlas;
 
     #[test]
     fn a_rough_parabola_has_the_vertex_of_the_smooth_one() {
@@ -442,19 +491,48 @@ mod tests {
         let mut stream = sim::Streams { seed: 3, run: 0 }.open("race");
         let mut out = 0;
         for _ in 0..400 {
-            let mut square = |size: usize| {
+            let mut left = |size: usize| {
                 let off = if size == 2 { 0.0 } else { 40.0_f64.sqrt() };
                 let noisy = |i: usize| if i == size { 1.0 + off } else { 1.0 };
-                (0..COUNT)
-                    .map(|i| (noisy(i) + 0.5_f64.sqrt() * stream.normal()).powi(2))
-                    .sum::<f64>()
+                White::from_fn(COUNT, |i, _| noisy(i) + 0.5_f64.sqrt() * stream.normal())
             };
-            let squares: Vec<f64> = (0..9).map(&mut square).collect();
-            let lowest = squares.iter().copied().fold(f64::INFINITY, f64::min);
-            out += usize::from(squares[2] > may_be_least(lowest, 0.5));
+            let left: Vec<White> = (0..9).map(&mut left).collect();
+            out += usize::from(!may_be_least(&left.iter().collect::<Vec<_>>(), 0.5)[2]);
         }
         assert!(out <= 4, "{out}");
-        assert!(may_be_least(300.0, 0.5) < 375.0, "what is far off is out");
+    }
+
+    #[test]
+    fn what_is_far_off_is_out_of_a_race_the_sooner_the_more_alike_the_draws() {
+        let left = |first: f64| White::from_fn(300, |i, _| if i == 0 { first } else { 1.0 });
+        let is_out = |off: f64| !may_be_least(&[&left(1.0), &left(1.0 + off)], 0.5)[1];
+        assert!(!is_out(3.9) && is_out(4.1) && is_out(20.0));
+    }
+
+    #[test]
+    fn the_vertex_of_a_clear_parabola_ends_a_hunt_and_a_rough_one_does_not() {
+        let hunt = Hunt::new(atlas().at_rest(Hypothesis::nothing()), 0, 30.0, 0.3);
+        let mut stream = sim::Streams { seed: 4, run: 0 }.open("vertex");
+        let mut vertex = |least_at: f64, roughness: f64| {
+            let mut look = |i: i32| {
+                let size = hunt.size + hunt.reach() * f64::from(i) / 4.0;
+                let square = 1000.0 + ((size - least_at) / 0.02).powi(2) + roughness * stream.normal();
+                let left = White::from_element(1, square.sqrt());
+                Look {
+                    size,
+                    left: [left.clone(), left],
+                }
+            };
+            sharp_vertex(&(-4..=4).map(&mut look).collect::<Vec<_>>(), &hunt)
+        };
+        let found = vertex(30.11, 0.0).unwrap();
+        assert!((found.size - 30.11).abs() < 1e-9 && (found.error - 0.02).abs() < 1e-9);
+        // The ends rise by 400: noise of 20 hides no more than a quarter of a standard error, and of 100 more than one.
+        let found = vertex(30.11, 20.0).unwrap();
+        assert!((found.size - 30.11).abs() < 0.02, "{}", found.size);
+        assert!(vertex(30.11, 150.0).is_none());
+        // The least may lie beyond the ends.
+        assert!(vertex(30.35, 0.0).is_none());
     }
 
     #[test]

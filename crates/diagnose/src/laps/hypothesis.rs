@@ -39,7 +39,13 @@ impl Hypothesis {
 
     /// Whether an effect acts at a place of a wall or of the floor, which is fitted too.
     pub(super) fn has_place(&self, atlas: &Atlas) -> bool {
-        self.parts.iter().any(|part| atlas.probes[part.probe].has_place())
+        self.places(atlas).next().is_some()
+    }
+
+    /// Its parts that do.
+    pub(super) fn places(&self, atlas: &Atlas) -> impl Iterator<Item = usize> {
+        let has_place = |&part: &usize| atlas.probes[self.parts[part].probe].has_place();
+        (0..self.parts.len()).filter(has_place)
     }
 
     /// Whether no size goes over the runs or in time.

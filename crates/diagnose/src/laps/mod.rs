@@ -51,6 +51,7 @@ mod diagnosis;
 mod rounds;
 mod search;
 mod singles;
+mod slopes;
 mod verdict;
 
 // What is said beside the answer.

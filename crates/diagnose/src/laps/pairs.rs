@@ -53,6 +53,11 @@ impl Tried {
         self.descents.iter().any(is_there)
     }
 
+    /// Whether the best leaves nothing that even hints at another one.
+    pub(super) fn surely_fits(&self) -> bool {
+        best_of(&self.descents).is_some_and(Descent::surely_fits)
+    }
+
     /// Whether the best leaves nothing significant.
     pub(super) fn fits(&self) -> bool {
         best_of(&self.descents).is_some_and(Descent::fits)
@@ -70,7 +75,7 @@ impl Search<'_> {
             return Vec::new();
         }
         let mut tried = Tried::new(&ROUNDS_OF_SEVERAL, f64::NEG_INFINITY);
-        self.try_together(&mut tried);
+        self.try_together(&mut tried, &[]);
         self.with_exchanged(tried)
     }
 
@@ -106,7 +111,7 @@ impl Search<'_> {
             self.descend_on(&mut tried, self.pairs_about(single));
         }
         if !tried.fits() {
-            self.try_together(&mut tried);
+            self.try_together(&mut tried, singles);
         }
         if !tried.fits() {
             let singles = of_other_effects(singles.iter()).into_iter().take(BASES);
@@ -139,14 +144,34 @@ impl Search<'_> {
         self.hunts_of_pairs(&screened)
     }
 
-    /// Adds the best of the pairs that are looked for together, from which is descended once.
-    pub(super) fn try_together(&self, tried: &mut Tried) {
+    /// Adds the best of the pairs that are looked for together, from which is descended once: from where a single effect came to
+    /// rest if one of theirs is about there.
+    pub(super) fn try_together(&self, tried: &mut Tried, singles: &[Found]) {
         const PAIRS: usize = 5;
         let best = self.together().iter().take(PAIRS);
-        let best: Vec<Hypothesis> = best.map(|pair| pair.hypothesis.clone()).collect();
+        let best: Vec<Hypothesis> = best
+            .map(|pair| self.at_places_of(singles, &pair.hypothesis))
+            .collect();
         let descend = || self.descend_several(&best, &ROUNDS_OF_SEVERAL, f64::NEG_INFINITY);
         (tried.descents).extend(self.descended_together.get_or_init(descend).iter().cloned());
         tried.starts.extend(best);
+    }
+
+    /// A hypothesis with the numbers of single effects that have a place in place of those that are about there.
+    fn at_places_of(&self, singles: &[Found], hypothesis: &Hypothesis) -> Hypothesis {
+        let mut moved = hypothesis.clone();
+        for part in &mut moved.parts {
+            let is_about_there = |found: &&Found| match found.hypothesis.parts.as_slice() {
+                [found] => part.is_at_place_of(found, self.atlas()),
+                _ => false,
+            };
+            if self.atlas().probes[part.probe].has_place()
+                && let Some(found) = singles.iter().find(is_about_there)
+            {
+                *part = found.hypothesis.parts[0].clone();
+            }
+        }
+        moved
     }
 
     /// Pairs that together explain most as far as actions add up, as simulations where they were screened rank them; simulated

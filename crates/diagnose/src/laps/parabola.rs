@@ -1,25 +1,39 @@
 //! The neighbourhood of a hypothesis: what a step in each of its numbers does to the expectation, as parabolas, and where
 //! on them the data are nearest.
 
+use std::collections::BTreeMap;
 use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector};
 
-use super::atlas::{Atlas, White, white};
+use super::atlas::{Atlas, White, in_other_units, white};
 use super::expectation::{Expectation, Scatter};
 use super::hypothesis::Hypothesis;
 use super::layout::Layout;
 use super::likelihood::{Doubt, Fit};
 use super::part::Freedom;
 use super::simulated::Evaluated;
+use super::slopes::Slopes;
 use super::trial::Trial;
 
 impl Trial<'_> {
     /// A hypothesis and its neighbourhood, each point simulated with so many data sets; `None` where the robot crashes.
     pub(super) fn local(&self, hypothesis: &Hypothesis, freedoms: &[Freedom], sets: u64) -> Option<Local> {
+        self.local_knowing(&BTreeMap::new(), hypothesis, freedoms, sets)
+    }
+
+    /// The same where slopes of some parts are known: nothing is simulated to the sides of these.
+    pub(super) fn local_knowing(
+        &self,
+        known: &BTreeMap<usize, Slopes>,
+        hypothesis: &Hypothesis,
+        freedoms: &[Freedom],
+        sets: u64,
+    ) -> Option<Local> {
         let center = self.evaluate(hypothesis, sets)?;
         let mut sides = Vec::with_capacity(freedoms.len());
-        for group in groups(freedoms) {
+        let is_new = |group: &Vec<Freedom>| !known.contains_key(&group[0].part);
+        for group in groups(freedoms).into_iter().filter(is_new) {
             let at = |sign: f64| {
                 let moves: Vec<(Freedom, f64)> = group.iter().map(|f| (*f, sign * f.step)).collect();
                 let moved = hypothesis.moved(self.atlas, &moves);
@@ -79,6 +93,13 @@ impl Trial<'_> {
         for (column, widening) in columns.iter_mut().zip(widenings) {
             column.widening = widening;
         }
+        let mut seen = columns.into_iter();
+        let of_part = |own: &[Freedom]| match known.get(&own[0].part) {
+            Some(slopes) => slopes.in_units_of(&scatter, &self.atlas.layout),
+            None => seen.by_ref().take(own.len()).collect(),
+        };
+        let parts = freedoms.chunk_by(|a, b| a.part == b.part);
+        let columns = parts.flat_map(of_part).collect();
         Some(Local {
             center,
             scatter,
@@ -203,6 +224,18 @@ impl Local {
 }
 
 impl Column {
+    /// The same in units of another scatter.
+    pub(super) fn in_other_units(&self, layout: &Layout, from: &[Scatter], to: &[Scatter]) -> Self {
+        let other = |white: &White| in_other_units(white, layout, from, to);
+        Self {
+            slope: other(&self.slope),
+            curvature: other(&self.curvature),
+            doubt: other(&self.doubt),
+            curvature_doubt: other(&self.curvature_doubt),
+            widening: self.widening.clone(),
+        }
+    }
+
     /// The same parabola as seen from another point of it.
     pub(super) fn from(&self, moved: f64) -> Self {
         Self {

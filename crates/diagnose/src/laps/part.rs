@@ -1,6 +1,7 @@
 //! One effect of a hypothesis, with its sizes and their pattern, and the numbers of it that can be fitted.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use sim::{Pattern, Setting};
 
@@ -8,6 +9,7 @@ use super::atlas::Atlas;
 use super::intervals::Interval;
 use super::path::at;
 use super::probe::{Probe, other_at_place};
+use super::slopes::Slopes;
 use crate::candidate::apart;
 use crate::slip::{level_of, memory_of};
 
@@ -23,7 +25,7 @@ pub(super) enum Shape {
 }
 
 /// One effect of a hypothesis.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub(super) struct Part {
     pub(super) probe: usize,
     pub(super) shape: Shape,
@@ -37,6 +39,26 @@ pub(super) struct Part {
     pub(super) held: Option<f64>,
     /// What goes with its size wherever a descent leads that.
     pub(super) tied: Option<Tied>,
+    /// What its numbers do, if it was looked around there or near by.
+    pub(super) slopes: Option<Arc<Slopes>>,
+}
+
+impl PartialEq for Part {
+    /// What was seen of a part tells it from no other.
+    fn eq(&self, other: &Self) -> bool {
+        let Self {
+            probe,
+            shape,
+            values,
+            per_s,
+            stride,
+            held,
+            tied,
+            slopes: _,
+        } = self;
+        (*probe, *shape, *per_s, *stride) == (other.probe, other.shape, other.per_s, other.stride)
+            && (values, held, tied) == (&other.values, &other.held, &other.tied)
+    }
 }
 
 /// A value that is a known multiple of its effect's size.
@@ -113,6 +135,7 @@ impl Part {
                 stride: 1.0,
                 held: None,
                 tied: None,
+                slopes: None,
             },
             Shape::ByRun => Self {
                 probe,
@@ -122,6 +145,7 @@ impl Part {
                 stride: 1.0,
                 held: None,
                 tied: None,
+                slopes: None,
             },
             Shape::ByTime => {
                 let per_s = sizes[1] / atlas.lap_s();
@@ -133,6 +157,7 @@ impl Part {
                     stride: 1.0,
                     held: None,
                     tied: None,
+                    slopes: None,
                 }
             }
         }
@@ -181,7 +206,13 @@ impl Part {
             stride: (0.3 * largest).max(1.0),
             held: None,
             tied: None,
+            slopes: None,
         }
+    }
+
+    /// The same of which nothing was seen.
+    pub(super) fn without_slopes(self) -> Self {
+        Self { slopes: None, ..self }
     }
 
     /// The same with a value that goes with its size.
@@ -237,6 +268,7 @@ impl Part {
         (can && self.shape == Shape::Constant && self.held.is_none()).then(|| Self {
             shape,
             values: vec![self.values[0].clone(); lists],
+            slopes: None,
             ..self.clone()
         })
     }
@@ -261,6 +293,7 @@ impl Part {
             shape: Shape::Constant,
             values: vec![values],
             per_s: 0.0,
+            slopes: None,
             ..self.clone()
         }
     }

@@ -1,5 +1,8 @@
 //! The size of a hypothesis by simulation, and how well it then explains the data.
 
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use sim::Stage;
@@ -13,6 +16,7 @@ use super::part::{Freedom, Part, Shape};
 use super::rounds::{ERRORS, NEAR, best_of};
 use super::screen::price;
 use super::simulated::Evaluated;
+use super::slopes::Slopes;
 use super::tests_of_fit::{Departures, HOPELESS_P, SIGNIFICANT_P};
 use super::trial::Trial;
 use crate::answer::is_noise;
@@ -216,6 +220,12 @@ impl Descent {
         self.score + (progress.unwrap_or(0.0) - ERRORS * self.score_error).max(0.0)
     }
 
+    /// Whether it lies so far behind the best that no more simulations would bring it near that.
+    pub(super) fn is_far_behind(&self, best: &Self) -> bool {
+        const FAR: f64 = 2.0 * NEAR;
+        self.within_reach() < best.score - FAR.max(self.behind_by_chance(best.score_error))
+    }
+
     /// The log-likelihood by which it may be behind one whose score has such an error, and end near it.
     pub(super) fn behind_by_chance(&self, error: f64) -> f64 {
         const ERRORS_BEHIND: f64 = 2.5;
@@ -232,11 +242,42 @@ impl Descent {
         (self.remainder).is_some_and(|left| left.omnibus_p() >= SIGNIFICANT_P)
     }
 
+    /// The same beyond the doubt that a wrong effect might do as well.
+    pub(super) fn surely_fits(&self) -> bool {
+        const SURELY_P: f64 = 0.1;
+        (self.remainder).is_some_and(|left| left.omnibus_p() >= SURELY_P)
+    }
+
     /// Whether an earlier look still tells what its numbers do: they moved within its steps, not along noise, and little is
     /// left, which slopes that are a little off could be taken for.
     fn knows_its_slopes(&self) -> bool {
         let clear = (self.near.as_ref()).is_some_and(|(local, _)| !local.is_noisy());
         self.holds && clear && !self.leaves_far_too_much()
+    }
+
+    /// The slopes of those of its parts that are known from elsewhere, until it looks around itself.
+    fn known_slopes(&self, atlas: &Atlas) -> BTreeMap<usize, Slopes> {
+        if self.looks > 0 || self.hypothesis.parts.len() < 2 {
+            return BTreeMap::new();
+        }
+        let known = |(i, part): (usize, &Part)| Some((i, part.slopes.as_ref()?.seen_from(part, atlas)?));
+        let parts = self.hypothesis.parts.iter().enumerate();
+        parts.filter_map(known).collect()
+    }
+
+    /// Has each of its parts that have a place know what a look around told of it.
+    fn keep_slopes(&mut self, local: &Local, atlas: &Atlas) {
+        for part in self.hypothesis.places(atlas).collect::<Vec<_>>() {
+            let slopes = Slopes::of(part, &self.hypothesis, &self.freedoms, local);
+            self.hypothesis.parts[part].slopes = Some(Arc::new(slopes));
+        }
+    }
+
+    /// Whether its numbers are about where they are in a hypothesis of the same parts, by their errors.
+    pub(super) fn is_within_errors_of(&self, other: &Hypothesis, atlas: &Atlas) -> bool {
+        const ERRORS: f64 = 1.5;
+        let mut numbers = self.freedoms.iter().zip(&self.errors);
+        numbers.all(|(freedom, error)| self.hypothesis.apart(other, freedom, atlas).abs() < ERRORS * error)
     }
 
     fn errors(&self) -> Vec<(Freedom, f64)> {
@@ -310,11 +351,16 @@ impl Trial<'_> {
         })
     }
 
-    fn look_around(&self, descent: Descent, round: Round) -> Option<Descent> {
+    fn look_around(&self, mut descent: Descent, round: Round) -> Option<Descent> {
         let full = round == Round::Full;
-        let points = 2 * descent.freedoms.len() as u64 + 1;
+        let known = descent.known_slopes(self.atlas);
+        let is_new = |freedom: &&Freedom| !known.contains_key(&freedom.part);
+        let points = 2 * descent.freedoms.iter().filter(is_new).count() as u64 + 1;
         let sets = self.atlas.enough(round.sets_around(points), points);
-        let mut local = self.local(&descent.hypothesis, &descent.freedoms, sets)?;
+        let mut local = self.local_knowing(&known, &descent.hypothesis, &descent.freedoms, sets)?;
+        if round != Round::Rough {
+            descent.keep_slopes(&local, self.atlas);
+        }
         let Descent {
             hypothesis, freedoms, ..
         } = &descent;
@@ -364,6 +410,9 @@ impl Trial<'_> {
         } = descent;
         let correlation = nearest.correlation();
         let Nearest { moves, errors, .. } = nearest;
+        // A place that is known was looked around elsewhere.
+        let knows_place =
+            !known.is_empty() && (hypothesis.places(self.atlas)).all(|part| known.contains_key(&part));
         let hypothesis = self.atlas.with_moves(&hypothesis, &freedoms, &moves);
         let found = full && is_settled(&moves, &nearest.covariance, &freedoms);
         let holds = are_within_steps(&moves, &freedoms);
@@ -382,7 +431,7 @@ impl Trial<'_> {
             near: Some((local, moves)),
             rises: Rises::default(),
             seen: here,
-            looks: looks + 1,
+            looks: looks + 1 + u32::from(knows_place),
             holds,
             rests: false,
             found,
@@ -477,6 +526,19 @@ impl Trial<'_> {
             }
         };
         let end = self.evaluate_more(&hypothesis, &simulated, sets)?;
+        self.settled_at(found, hypothesis, end)
+    }
+
+    /// A hypothesis as the last round of its descent judged it, before its last move; `None` if it was not judged, or cannot be settled.
+    pub(super) fn settle_as_judged(&self, found: &Descent) -> Option<Settled> {
+        let judged = found.judged.as_ref()?;
+        let hypothesis = judged.hypothesis.clone();
+        (self.atlas.may_be_settled(&hypothesis))
+            .then(|| self.settled_at(found, hypothesis, judged.simulated.clone()))
+            .flatten()
+    }
+
+    fn settled_at(&self, found: &Descent, hypothesis: Hypothesis, end: Evaluated) -> Option<Settled> {
         let fit = self.fit_with_error(&end)?;
         let errors = (found.errors(), found.correlation.clone());
         Some(self.atlas.settled(hypothesis, errors, fit, end))

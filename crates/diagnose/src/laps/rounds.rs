@@ -129,6 +129,9 @@ impl Search<'_> {
             if alive.is_empty() {
                 break;
             }
+            if round == Round::Full {
+                without_also_rans(&mut alive, FEW);
+            }
             self.tell(format_args!("{}", self.in_words(&alive)));
             alive = (alive.into_par_iter())
                 .filter_map(|descent| self.trial.descend(descent, round))
@@ -214,7 +217,13 @@ impl Search<'_> {
 
     /// The ends of descents, those near the best judged together.
     fn ends(&self, descents: &[Descent]) -> Vec<Settled> {
-        let settled = (descents.par_iter()).filter_map(|descent| self.trial.settle(descent));
+        let best = best_of(descents);
+        let settle = |descent: &Descent| {
+            let is_far = best.is_some_and(|best| descent.is_far_behind(best));
+            (is_far.then(|| self.trial.settle_as_judged(descent)).flatten())
+                .or_else(|| self.trial.settle(descent))
+        };
+        let settled = descents.par_iter().filter_map(settle);
         let (mut near, others) = near_and_others(settled.collect(), NEAR);
         if near.len() > 1 {
             near = self.trial.settle_rivals(near, 0);
@@ -265,8 +274,12 @@ impl Search<'_> {
                     if descent.score < least || place >= most {
                         return Some(descent);
                     }
+                    let there = descent.hypothesis.with_held(&known);
+                    if there == descent.hypothesis {
+                        return Some(descent);
+                    }
                     let start = match moved {
-                        Moved::Far => Descent::start(self.atlas(), &descent.hypothesis.with_held(&known)),
+                        Moved::Far => Descent::start(self.atlas(), &there),
                         Moved::Little => descent.with_held(&known),
                     };
                     self.trial.descend(start, Round::Full)
@@ -308,8 +321,9 @@ impl Search<'_> {
                     break;
                 };
                 let gained = hunted.score - rival.score;
+                let rests = hunted.is_within_errors_of(&rival.hypothesis, self.atlas());
                 *rival = hunted;
-                if gained <= MATTERS {
+                if gained <= MATTERS || rests {
                     break;
                 }
             }
@@ -371,6 +385,20 @@ const SLOW: f64 = 0.1;
 pub(super) fn near(found: &[Found]) -> f64 {
     const NEAR: f64 = 0.8;
     (found.first()).map_or(f64::NEG_INFINITY, |best| NEAR * best.explanation.score)
+}
+
+/// Leaves so few of descents, best first, and those that are near the best, where that leaves far too much: what is behind it lacks
+/// something else too.
+fn without_also_rans(descents: &mut Vec<Descent>, few: usize) {
+    let Some(best) = descents.first().filter(|best| best.leaves_far_too_much()) else {
+        return;
+    };
+    let least = best.score - NEAR;
+    let near = descents
+        .iter()
+        .take_while(|descent| descent.score >= least)
+        .count();
+    descents.truncate(near.max(few));
 }
 
 /// Whether the best descent leaves far too much and does not get on: more rounds would not make an answer of it.

@@ -201,7 +201,9 @@ impl Search<'_> {
             let screened = self.atlas().ranked_constant(opposite.into_iter(), &left);
             starts.extend(screened.iter().take(MOST).map(|s| rest.with(&s.hypothesis)));
         }
-        self.settle_near(self.descend(starts.iter(), &ROUNDS, f64::NEG_INFINITY))
+        let several = best.hypothesis.parts.len() > 1;
+        let rounds: &[Rung] = if several { &ROUNDS_OF_SEVERAL } else { &ROUNDS };
+        self.settle_near(self.descend(starts.iter(), rounds, best.explanation.score))
     }
 
     /// Explanations near the best with the same effects at the other sensors, tried to the end: of one effect two were so far.

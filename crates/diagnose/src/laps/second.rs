@@ -29,11 +29,11 @@ impl Search<'_> {
         let mut tried = Tried::new(&ROUNDS_BESIDE, reached);
         let jumps = self.jumps(&single.hypothesis);
         let surely_lacks = !suffices(&single.explanation);
-        if jumps && surely_lacks {
-            self.descend_on(&mut tried, self.jumping_beside(found.iter()));
-        }
-        if !stands_alone(&single.explanation) && !single.explanation.fits() && !tried.fits() {
+        if !stands_alone(&single.explanation) && !single.explanation.fits() {
             self.descend_on(&mut tried, self.pairs_about(single));
+        }
+        if jumps && surely_lacks && !tried.surely_fits() {
+            self.descend_on(&mut tried, self.jumping_beside(found.iter()));
         }
         let mut promises = false;
         if !tried.fits() {
@@ -75,7 +75,7 @@ impl Search<'_> {
         }
         // Two effects that have nothing of the single one may do together what it does nearly.
         if self.lacks_more_than_faults(single) && !tried.fits() {
-            self.try_together(&mut tried);
+            self.try_together(&mut tried, found);
         }
         if promises && !jumps && surely_lacks && !tried.fits() {
             self.descend_on(&mut tried, self.jumping_beside(found.iter()));
