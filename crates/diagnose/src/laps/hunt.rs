@@ -265,10 +265,8 @@ impl Trial<'_> {
             draws[0].error(runs.unwrap_or(1)),
         );
         (first.into_par_iter().zip(may))
-            .filter_map(|((size, first), may)| {
-                if !may {
-                    return None;
-                }
+            .filter(|(_, may)| *may)
+            .filter_map(|((size, first), _)| {
                 let left = [first, left(size, &draws[1])?];
                 Some(Look { size, left })
             })
@@ -340,8 +338,8 @@ fn squares(looks: &[Look]) -> Vec<(f64, f64)> {
     looks.iter().map(|look| (look.square(), look.size)).collect()
 }
 
-/// The vertex of a parabola through what sizes about a hunt's leave, if it costs less than a size one standard error aside, and is
-/// surely between them: the least of rough distances costs more.
+/// The vertex of a parabola through what sizes about a hunt's leave, if it lies well between them and their roughness costs less than a
+/// size one standard error aside does: the lowest of rough distances is lowest by chance.
 fn sharp_vertex(looks: &[Look], hunt: &Hunt) -> Option<Vertex> {
     /// Squared distance that the roughness may cost.
     const COST: f64 = 1.0;
@@ -527,7 +525,7 @@ mod tests {
         };
         let found = vertex(30.11, 0.0).unwrap();
         assert!((found.size - 30.11).abs() < 1e-9 && (found.error - 0.02).abs() < 1e-9);
-        // The ends rise by 400: noise of 20 hides no more than a quarter of a standard error, and of 100 more than one.
+        // The ends rise by 400: noise of 20 costs a quarter of a standard error, and of 150 two.
         let found = vertex(30.11, 20.0).unwrap();
         assert!((found.size - 30.11).abs() < 0.02, "{}", found.size);
         assert!(vertex(30.11, 150.0).is_none());
