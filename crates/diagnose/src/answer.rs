@@ -99,6 +99,13 @@ impl Explanation {
         (ALTERNATIVE + self.gain_error).max(2.0 * self.gain_error)
     }
 
+    /// Whether data do not tell another one from it: of as many effects, with a cause without a name if it has one, and not so far behind.
+    fn is_not_told_from(&self, other: &Self) -> bool {
+        other.score >= self.score - self.tells_apart()
+            && other.effects.len() == self.effects.len()
+            && other.has_no_name() == self.has_no_name()
+    }
+
     /// Whether a cause without a name is among the effects.
     pub(crate) fn has_no_name(&self) -> bool {
         self.effects.iter().any(|effect| *effect.setting.spec == UNLISTED)
@@ -155,17 +162,34 @@ pub(crate) fn is_noise(name: &str) -> bool {
     ["slip-level", "slip-memory", "reading-noise", "camera-noise"].contains(&name)
 }
 
-/// How many of the first explanations, best first, data do not tell from the best: of as many effects, with a cause without a
-/// name if it has one, and not so far behind.
+/// How many of the first explanations, best first, data do not tell from the best.
 pub(crate) fn indistinguishable<'a>(explanations: impl Iterator<Item = &'a Explanation> + Clone) -> usize {
     explanations.clone().next().map_or(0, |best| {
-        let alike = |e: &&Explanation| {
-            e.score >= best.score - best.tells_apart()
-                && e.effects.len() == best.effects.len()
-                && e.has_no_name() == best.has_no_name()
-        };
-        explanations.take_while(alike).count()
+        explanations
+            .take_while(|other| best.is_not_told_from(other))
+            .count()
     })
+}
+
+/// Brings what data do not tell from the first of some explanations behind it and what stands there, wherever it was found, but for
+/// what is the `same` as one of these; how many these are.
+pub(crate) fn with_rivals_first<T>(
+    found: &mut [T],
+    explanation: impl Fn(&T) -> &Explanation,
+    same: impl Fn(&T, &T) -> bool,
+) -> usize {
+    let in_order = indistinguishable(found.iter().map(&explanation));
+    let mut rivals = in_order;
+    for place in in_order..found.len() {
+        let (known, other) = (&found[..rivals], &found[place]);
+        if explanation(&found[0]).is_not_told_from(explanation(other))
+            && !known.iter().any(|known| same(known, other))
+        {
+            found[rivals..=place].rotate_right(1);
+            rivals += 1;
+        }
+    }
+    rivals
 }
 
 /// Where a cause sits that no listed effect is.
@@ -355,6 +379,28 @@ mod tests {
             left_out: Vec::new(),
             cause: None,
         }
+    }
+
+    #[test]
+    fn what_is_not_told_from_the_first_is_a_rival_wherever_it_was_found() {
+        let both = answer(1.01, 1.0).explanations.remove(0);
+        let by = |effects: usize, score: f64| Explanation {
+            effects: both.effects[..effects].to_vec(),
+            score,
+            ..both.clone()
+        };
+        let mut found = vec![
+            by(2, 90.0),
+            by(2, 88.0),
+            by(1, 89.0),
+            by(2, 84.0),
+            by(2, 86.0),
+            by(2, 86.5),
+        ];
+        let same = |a: &Explanation, b: &Explanation| (a.score - b.score).abs() < 1.0;
+        assert_eq!(with_rivals_first(&mut found, |found| found, same), 3);
+        let scores: Vec<f64> = found.iter().map(|found| found.score).collect();
+        assert_eq!(scores, [90.0, 88.0, 86.0, 89.0, 84.0, 86.5]);
     }
 
     /// One effect, claimed, beside others by some effects more that gain so much more by one number each.

@@ -18,7 +18,7 @@ use super::verdict::{
     is_claimed, is_doubtful, leaves_nothing_to_ask, preferred, stands_alone, suffices, unless_as_good,
     unless_named, verdict_of, with_first,
 };
-use crate::answer::indistinguishable;
+use crate::answer::{indistinguishable, with_rivals_first};
 use crate::{Answer, Cause, Error, Explanation, Verdict, Watch};
 
 /// Score of the best probe from which a data set counts as departing from the declared model, whatever the omnibus says.
@@ -88,7 +88,8 @@ impl Atlas {
             Some(ripple) => explain_ripple(&search, &screened, &ripple),
             None => explain(&search, search.singles(&screened)),
         };
-        let indistinguishable = indistinguishable(found.iter().map(|found| &found.explanation));
+        let same = |one: &Found, other: &Found| one.hypothesis.has_patterns_of(&other.hypothesis);
+        let indistinguishable = with_rivals_first(&mut found, |found| &found.explanation, same);
         explained_first(&mut found[..indistinguishable]);
         if verdict_of_first(&found) == Verdict::Explained {
             let equal = found[..indistinguishable].iter();
