@@ -103,7 +103,7 @@ impl Recording {
         sets: Vec<DataSet>,
     ) -> Result<Vec<Self>> {
         /// Memory for draws that simulations share.
-        const TAPE_BYTES: usize = 128 << 20;
+        const TAPE_BYTES: usize = 384 << 20;
         let mut recordings: Vec<Self> = Vec::with_capacity(sets.len());
         for mut set in sets {
             let (first_run, name) = (runs(&recordings).count(), set.name.clone());

@@ -19,8 +19,8 @@ impl Tapes {
 
     /// Room for as many data sets, of runs of so many laps, as fit in some memory.
     pub(super) fn new(world: &World<'_>, laps: &[usize], most_bytes: usize) -> Self {
-        /// Each of those beyond is simulated less than a tenth as often as the first.
-        const SETS: usize = 8;
+        /// As many as every hypothesis is simulated with that comes to the end; those beyond are met seldom.
+        const SETS: usize = 16;
         let bytes: usize = laps.iter().map(|&laps| Tape::bytes(world, laps)).sum();
         let sets = SETS.min(most_bytes / bytes.max(1));
         let runs = || laps.iter().map(|_| OnceLock::new()).collect();

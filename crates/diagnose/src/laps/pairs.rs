@@ -54,8 +54,9 @@ impl Tried {
     }
 
     /// Whether the best leaves nothing that even hints at another one.
-    pub(super) fn surely_fits(&self) -> bool {
-        best_of(&self.descents).is_some_and(Descent::surely_fits)
+    pub(super) fn leaves_no_hint(&self) -> bool {
+        const HINT_P: f64 = 0.1;
+        best_of(&self.descents).is_some_and(|best| best.leaves_more_likely_than(HINT_P))
     }
 
     /// Whether the best leaves nothing significant.

@@ -13,7 +13,7 @@ use super::layout::Layout;
 use super::likelihood::{Doubt, Fit};
 use super::part::Freedom;
 use super::simulated::Evaluated;
-use super::slopes::Slopes;
+use super::slopes::SeenSlopes;
 use super::trial::Trial;
 
 impl Trial<'_> {
@@ -25,7 +25,7 @@ impl Trial<'_> {
     /// The same where slopes of some parts are known: nothing is simulated to the sides of these.
     pub(super) fn local_knowing(
         &self,
-        known: &BTreeMap<usize, Slopes>,
+        known: &BTreeMap<usize, SeenSlopes>,
         hypothesis: &Hypothesis,
         freedoms: &[Freedom],
         sets: u64,

@@ -16,7 +16,7 @@ use super::part::{Freedom, Part, Shape};
 use super::rounds::{ERRORS, NEAR, best_of};
 use super::screen::price;
 use super::simulated::Evaluated;
-use super::slopes::Slopes;
+use super::slopes::{SeenSlopes, Slopes};
 use super::tests_of_fit::{Departures, HOPELESS_P, SIGNIFICANT_P};
 use super::trial::Trial;
 use crate::answer::is_noise;
@@ -202,10 +202,10 @@ impl Descent {
         }
     }
 
-    /// The same with other sizes of what was found by trying many, at which its other numbers do what they did.
-    pub(super) fn with_held(self, known: &[Part]) -> Self {
+    /// The same at a hypothesis with other sizes of what was found by trying many, at which its other numbers do what they did.
+    pub(super) fn at(self, hypothesis: Hypothesis) -> Self {
         Self {
-            hypothesis: self.hypothesis.with_held(known),
+            hypothesis,
             rises: Rises::default(),
             seen: None,
             found: false,
@@ -239,13 +239,12 @@ impl Descent {
 
     /// Whether nothing significant is left, as far as a round saw.
     pub(super) fn fits(&self) -> bool {
-        (self.remainder).is_some_and(|left| left.omnibus_p() >= SIGNIFICANT_P)
+        self.leaves_more_likely_than(SIGNIFICANT_P)
     }
 
-    /// The same beyond the doubt that a wrong effect might do as well.
-    pub(super) fn surely_fits(&self) -> bool {
-        const SURELY_P: f64 = 0.1;
-        (self.remainder).is_some_and(|left| left.omnibus_p() >= SURELY_P)
+    /// Whether what is left is as likely as that by chance, as far as a round saw.
+    pub(super) fn leaves_more_likely_than(&self, p: f64) -> bool {
+        (self.remainder).is_some_and(|left| left.omnibus_p() >= p)
     }
 
     /// Whether an earlier look still tells what its numbers do: they moved within its steps, not along noise, and little is
@@ -256,7 +255,7 @@ impl Descent {
     }
 
     /// The slopes of those of its parts that are known from elsewhere, until it looks around itself.
-    fn known_slopes(&self, atlas: &Atlas) -> BTreeMap<usize, Slopes> {
+    fn known_slopes(&self, atlas: &Atlas) -> BTreeMap<usize, SeenSlopes> {
         if self.looks > 0 || self.hypothesis.parts.len() < 2 {
             return BTreeMap::new();
         }

@@ -280,7 +280,7 @@ impl Search<'_> {
                     }
                     let start = match moved {
                         Moved::Far => Descent::start(self.atlas(), &there),
-                        Moved::Little => descent.with_held(&known),
+                        Moved::Little => descent.at(there),
                     };
                     self.trial.descend(start, Round::Full)
                 })
@@ -312,7 +312,8 @@ impl Search<'_> {
         };
         let hunted = |rival: &Descent| {
             let hunted = self.trial.hunt_again(&rival.hypothesis, Moved::Little)?;
-            (self.trial).descend(rival.clone().with_held(&hunted.parts), Round::Full)
+            let there = rival.hypothesis.with_held(&hunted.parts);
+            (self.trial).descend(rival.clone().at(there), Round::Full)
         };
         let rivals = descents.iter_mut().skip(1).filter(|rival| is_rival(rival));
         for rival in rivals.take(MOST) {

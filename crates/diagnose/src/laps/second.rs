@@ -32,7 +32,7 @@ impl Search<'_> {
         if !stands_alone(&single.explanation) && !single.explanation.fits() {
             self.descend_on(&mut tried, self.pairs_about(single));
         }
-        if jumps && surely_lacks && !tried.surely_fits() {
+        if jumps && surely_lacks && !tried.leaves_no_hint() {
             self.descend_on(&mut tried, self.jumping_beside(found.iter()));
         }
         let mut promises = false;

@@ -1,5 +1,7 @@
 //! What the numbers of an effect do, kept from one hypothesis with it to the next.
 
+use std::sync::Arc;
+
 use super::atlas::Atlas;
 use super::expectation::Scatter;
 use super::hypothesis::Hypothesis;
@@ -34,8 +36,8 @@ impl Slopes {
         }
     }
 
-    /// The same parabolas as seen from another part; `None` from another effect, and from where they do not reach.
-    pub(super) fn seen_from(&self, part: &Part, atlas: &Atlas) -> Option<Self> {
+    /// Their parabolas as seen from another part; `None` from another effect, and from where they do not reach.
+    pub(super) fn seen_from(self: &Arc<Self>, part: &Part, atlas: &Atlas) -> Option<SeenSlopes> {
         /// Steps of the look that they reach.
         const STEPS: f64 = 2.0;
         let at = &self.at.parts[0];
@@ -49,17 +51,24 @@ impl Slopes {
             let reaches = apart.abs() <= STEPS * freedom.step;
             reaches.then(|| column.clone().without_noise().from(apart))
         });
-        Some(Self {
+        Some(SeenSlopes {
             columns: seen.collect::<Option<_>>()?,
-            freedoms: self.freedoms.clone(),
-            scatter: self.scatter.clone(),
-            at: there,
+            of: Arc::clone(self),
         })
     }
+}
 
+/// Slopes of an effect as they are elsewhere.
+#[derive(Debug)]
+pub(super) struct SeenSlopes {
+    columns: Vec<Column>,
+    of: Arc<Slopes>,
+}
+
+impl SeenSlopes {
     /// What each number does, in units of a scatter.
     pub(super) fn in_units_of(&self, scatter: &[Scatter], layout: &Layout) -> Vec<Column> {
-        let other = |column: &Column| column.in_other_units(layout, &self.scatter, scatter);
+        let other = |column: &Column| column.in_other_units(layout, &self.of.scatter, scatter);
         self.columns.iter().map(other).collect()
     }
 }
@@ -104,7 +113,7 @@ mod tests {
             .unwrap();
         let trial = Trial::new(&atlas, &bent, &data);
         let local = trial.local(&patch, &freedoms, SETS).unwrap();
-        let slopes = Slopes::of(0, &patch, &freedoms, &local);
+        let slopes = Arc::new(Slopes::of(0, &patch, &freedoms, &local));
 
         let by = |steps: f64| patch.moved(&atlas, &[(freedoms[0], steps * freedoms[0].step)]);
         let near = by(1.5);
