@@ -12,7 +12,7 @@ use crate::effects::Hook;
 use crate::effects::Moment;
 use crate::sensor::Combine;
 use crate::tape::{Draws, Played};
-use crate::world::World;
+use crate::world::{Geometry, World};
 use crate::{Error, Machine, Pose, Readings, WheelSpeeds};
 
 /// What one control step tells: the row of a run's file.
@@ -105,7 +105,7 @@ impl<'w> Run<'w> {
             sense,
             camera,
         };
-        run.pass_gate();
+        run.pass_gate(pose.position);
         Ok(run)
     }
 
@@ -249,17 +249,20 @@ impl<'w> Run<'w> {
         let step_s = rules.physics_step_s();
         let start_s = now.time_s;
         now.step_s = step_s;
+        // In registers: what is stored in one width and loaded in another the processor waits for.
+        let mut pose = self.pose;
         for k in 0..rules.physics_steps {
             now.time_s = start_s + f64::from(k) * step_s;
-            now.pose = self.pose;
+            now.pose = pose;
             let ground = self.ground(&now);
             let rolling = self.apparatus.machine.robot.twist(ground);
             let twist = self.apparatus.effects.twist(&now, rolling);
-            self.pose = self.pose.advance(twist, step_s);
-            self.pose.position = (self.apparatus.effects).drifted(&now, self.pose.position, step_s);
-            self.touch();
-            self.pass_gate();
+            pose = pose.advance(twist, step_s);
+            pose.position = (self.apparatus.effects).drifted(&now, pose.position, step_s);
+            pose.position = self.off_walls(pose);
+            self.pass_gate(pose.position);
         }
+        self.pose = pose;
     }
 
     /// Speeds of the wheels over the ground.
@@ -267,44 +270,41 @@ impl<'w> Run<'w> {
     fn ground(&mut self, now: &Moment) -> WheelSpeeds {
         let effects = &mut self.apparatus.effects;
         let wheels = effects.drive(now, now.command);
-        let draws = effects.slip(self.slip.symmetrics());
+        let (left, right) = effects.slip(self.slip.symmetrics().into());
         let level = self.apparatus.machine.slip_level;
         let slipping = WheelSpeeds {
-            left_m_s: wheels.left_m_s * (1.0 + level * draws[0]),
-            right_m_s: wheels.right_m_s * (1.0 + level * draws[1]),
+            left_m_s: wheels.left_m_s * (1.0 + level * left),
+            right_m_s: wheels.right_m_s * (1.0 + level * right),
         };
         effects.ground(now, slipping)
     }
 
-    /// Moves the centre away from walls that the body overlaps; the heading stays.
+    /// The centre moved away from walls that the body overlaps at a pose; the heading stays.
     #[inline]
-    fn touch(&mut self) {
+    fn off_walls(&mut self, pose: Pose) -> Vec2 {
         // Two walls at an acute corner push in turn; a body that fits is free after a few.
         const MOST_PUSHES: usize = 32;
         let radius_m = self.apparatus.machine.robot.body_radius_m;
+        let Geometry { contact, walls, .. } = &*self.apparatus.geometry;
+        let mut center = pose.position;
         for push in 0..MOST_PUSHES {
-            let Some(point) = self.apparatus.geometry.contact.nearest_within(
-                &self.apparatus.geometry.walls,
-                self.pose.position,
-                radius_m,
-            ) else {
-                return;
+            let Some(point) = contact.nearest_within(walls, center, radius_m) else {
+                break;
             };
             self.contacts += u64::from(push == 0);
-            let away = (self.pose.position - point)
-                .try_normalize()
-                .unwrap_or(-self.pose.heading);
+            let away = (center - point).try_normalize().unwrap_or(-pose.heading);
             // A hair more than the radius, so that rounding does not make it overlap again.
-            self.pose.position = point + away * (radius_m * (1.0 + 1e-12));
+            center = point + away * (radius_m * (1.0 + 1e-12));
         }
+        center
     }
 
     /// Starts the random streams afresh when the true position passes the next gate.
     #[inline]
-    fn pass_gate(&mut self) {
+    fn pass_gate(&mut self, position: Vec2) {
         let gates = &self.apparatus.world.circuit().gates;
         let gate = &gates[self.next_gate];
-        let way = self.pose.position - gate.center;
+        let way = position - gate.center;
         if way.dot(self.apparatus.world.forward(self.next_gate)) < 0.0 || way.length_squared() > 0.04 {
             return;
         }

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use anyhow::{Context, Result, ensure};
 use diagnose::{Extent, ObservedRun, Unseen, coarse_unit_m};
+use rayon::prelude::*;
 use sim::{Draws, Setting, Start, Step, Streams, Vec2, World};
 use track::Lap;
 
@@ -348,7 +349,9 @@ impl Recording {
             let (closed, path) = place.drive(setup, &world, draws, laps).ok()?;
             (closed.len() == laps).then(|| place.observed(setup, closed, &path))
         };
-        runs.enumerate().map(run).collect()
+        // Of few data sets the last would keep one thread busy for all its runs.
+        let runs: Vec<_> = runs.enumerate().collect();
+        runs.into_par_iter().map(run).collect()
     }
 }
 

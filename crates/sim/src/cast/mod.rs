@@ -86,6 +86,22 @@ impl Hits {
         distance_m: [f64::INFINITY; LANES],
         segment: [0; LANES],
     };
+
+    /// Those within a range.
+    #[inline(always)]
+    fn within(self, range_m: f64) -> Self {
+        let limited = |distance_m: f64| {
+            if distance_m <= range_m {
+                distance_m
+            } else {
+                f64::INFINITY
+            }
+        };
+        Self {
+            distance_m: self.distance_m.map(limited),
+            ..self
+        }
+    }
 }
 
 /// Side and advance of a vertex as seen from a ray: the cross and the dot product of the ray's direction with the
@@ -232,20 +248,12 @@ impl Caster {
     /// What the rays hit within the range. `center` is the robot's centre, `walls` those the caster was made for.
     #[inline]
     pub fn cast(&self, walls: &Walls, center: Vec2, rays: &Rays) -> Hits {
-        let mut hits = match &self.method {
-            Method::Brute => brute(walls, rays),
-            Method::Bvh(bvh) => bvh.cast(rays, self.range_m),
-            Method::Cells(cells) => cells.cast(walls, center, rays),
-            Method::Tree(tree) => tree.cast(center, rays, self.range_m),
-        };
-        for distance in &mut hits.distance_m {
-            *distance = if *distance <= self.range_m {
-                *distance
-            } else {
-                f64::INFINITY
-            };
+        match &self.method {
+            Method::Brute => brute(walls, rays).within(self.range_m),
+            Method::Bvh(bvh) => bvh.cast(rays, self.range_m).within(self.range_m),
+            Method::Cells(cells) => cells.cast(walls, center, rays).within(self.range_m),
+            Method::Tree(tree) => tree.cast(center, rays, self.range_m).within(self.range_m),
         }
-        hits
     }
 }
 

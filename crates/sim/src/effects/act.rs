@@ -4,6 +4,7 @@ use std::collections::VecDeque;
 
 use track::Vec2;
 
+use super::kept::Kept;
 use super::plain::{OnDrift, OnDrive, OnGround, OnMachine, OnYaw};
 use super::sense::{decay, rounded};
 use super::{AZIMUTH, Effect, Hook, Moment, Param, Spec, Stage};
@@ -22,20 +23,26 @@ pub(super) const COMMAND_DELAY: Spec = Spec {
     build: || Box::<CommandDelay>::default(),
 };
 
-/// The commands of the last physics steps, the present one first.
 #[derive(Debug, Default)]
-struct CommandDelay(VecDeque<WheelSpeeds>);
+struct CommandDelay {
+    /// The commands of the last physics steps, the present one first.
+    last: VecDeque<WheelSpeeds>,
+    longest: Kept<2, usize>,
+    late: Kept<2, usize>,
+}
 
 impl Effect for CommandDelay {
     fn hooks(&self) -> &'static [Hook] {
         &[Hook::Drive]
     }
     fn drive(&mut self, values: &[f64], now: &Moment, wheels: WheelSpeeds) -> WheelSpeeds {
-        let steps = |time_s: f64| (time_s / now.step_s).round() as usize;
+        let steps = |[time_s, step_s]: [f64; 2]| (time_s / step_s).round() as usize;
         // All that the longest delay may ask for is kept, because a delay may grow during a run.
-        self.0.truncate(steps(LONGEST_DELAY_S));
-        self.0.push_front(wheels);
-        self.0.get(steps(values[0])).copied().unwrap_or_default()
+        self.last
+            .truncate(self.longest.of([LONGEST_DELAY_S, now.step_s], steps));
+        self.last.push_front(wheels);
+        let late = self.late.of([values[0], now.step_s], steps);
+        self.last.get(late).copied().unwrap_or_default()
     }
 }
 
@@ -73,20 +80,23 @@ pub(super) const MOTOR_LAG: Spec = Spec {
     build: || Box::<MotorLag>::default(),
 };
 
-/// The speeds of the step before.
 #[derive(Debug, Default)]
-struct MotorLag(WheelSpeeds);
+struct MotorLag {
+    /// The speeds of the step before.
+    before: WheelSpeeds,
+    decay: Kept<2, f64>,
+}
 
 impl Effect for MotorLag {
     fn hooks(&self) -> &'static [Hook] {
         &[Hook::Drive]
     }
     fn drive(&mut self, values: &[f64], now: &Moment, wheels: WheelSpeeds) -> WheelSpeeds {
-        let decay = decay(now.step_s, values[0]);
-        self.0 = both(wheels, self.0, |target, before| {
+        let decay = self.decay.of([now.step_s, values[0]], decay);
+        self.before = both(wheels, self.before, |target, before| {
             target + decay * (before - target)
         });
-        self.0
+        self.before
     }
 }
 
@@ -142,24 +152,26 @@ pub(super) const SLIP_MEMORY: Spec = Spec {
     summary: "first-order autoregressive slip at the physics step, its variance kept",
     params: &[Param::new("correlation", "", 0.0, -0.999, 0.999)],
     list: None,
-    build: || Box::new(SlipMemory(None)),
+    build: || Box::<SlipMemory>::default(),
 };
 
-/// The slips of the step before.
-#[derive(Debug)]
-struct SlipMemory(Option<[f64; 2]>);
+#[derive(Debug, Default)]
+struct SlipMemory {
+    /// The slips of the step before.
+    before: Option<(f64, f64)>,
+    fresh: Kept<1, f64>,
+}
 
 impl Effect for SlipMemory {
     fn hooks(&self) -> &'static [Hook] {
         &[Hook::Slip]
     }
-    fn slip(&mut self, values: &[f64], draws: [f64; 2]) -> [f64; 2] {
+    fn slip(&mut self, values: &[f64], draws: (f64, f64)) -> (f64, f64) {
         let correlation = values[0];
-        let fresh = (1.0 - correlation * correlation).sqrt();
-        let slips = self.0.map_or(draws, |before| {
-            [0, 1].map(|wheel| correlation * before[wheel] + fresh * draws[wheel])
-        });
-        self.0 = Some(slips);
+        let fresh = self.fresh.of([correlation], |[c]| (1.0 - c * c).sqrt());
+        let next = |before: f64, draw: f64| correlation * before + fresh * draw;
+        let slips = (self.before).map_or(draws, |(left, right)| (next(left, draws.0), next(right, draws.1)));
+        self.before = Some(slips);
         slips
     }
 }

@@ -126,7 +126,7 @@ impl Chain {
 
     /// The slip draws of both wheels.
     #[inline]
-    pub(crate) fn slip(&mut self, draws: [f64; 2]) -> [f64; 2] {
+    pub(crate) fn slip(&mut self, draws: (f64, f64)) -> (f64, f64) {
         self.each_mut(Hook::Slip, draws, |effect, values, draws| {
             effect.slip(values, draws)
         })

@@ -8,6 +8,7 @@ mod act;
 mod area;
 mod chain;
 mod decide;
+mod kept;
 mod observe;
 mod plain;
 mod ray_hits;
@@ -363,8 +364,9 @@ pub trait Effect: Debug + Send {
     fn drive(&mut self, _values: &[f64], _now: &Moment, wheels: WheelSpeeds) -> WheelSpeeds {
         wheels
     }
-    /// Changes the slip draws of the left and the right wheel, in [-1, 1].
-    fn slip(&mut self, _values: &[f64], draws: [f64; 2]) -> [f64; 2] {
+    /// Changes the slip draws of the left and the right wheel, in [-1, 1]. Two numbers that go through registers: an array would go
+    /// through memory, which the processor would wait for at every call.
+    fn slip(&mut self, _values: &[f64], draws: (f64, f64)) -> (f64, f64) {
         draws
     }
     /// Changes the speeds of the wheels over the ground.

@@ -2,7 +2,7 @@
 
 use track::Vec2;
 
-use super::{Effect, Hit, Hook, Moment};
+use super::{Effect, Hook, Moment};
 use crate::{Machine, Readings, Twist, WheelSpeeds};
 
 /// Changes constants of the machine.
@@ -28,19 +28,6 @@ impl Effect for OnReadings {
     }
     fn readings(&mut self, values: &[f64], now: &Moment, _machine: &Machine, readings: &mut Readings) {
         (self.0)(values, now, readings);
-    }
-}
-
-/// A factor on the response of each ray.
-#[derive(Debug)]
-pub(super) struct OnRays(pub(super) fn(&[f64], &Hit) -> f64);
-
-impl Effect for OnRays {
-    fn hooks(&self) -> &'static [Hook] {
-        &[Hook::RayFactors]
-    }
-    fn ray_factor(&self, values: &[f64], hit: &Hit) -> f64 {
-        (self.0)(values, hit)
     }
 }
 

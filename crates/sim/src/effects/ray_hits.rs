@@ -2,7 +2,7 @@
 
 use track::Side;
 
-use super::Hit;
+use super::{Hit, Site};
 use crate::cast::{Hits, LANES, Rays};
 use crate::{Scene, Walls};
 
@@ -44,6 +44,19 @@ impl RayHits<'_> {
         self.walls.side(self.hits.segment[lane] as usize)
     }
 
+    /// The place on a wall that a ray met.
+    #[inline]
+    pub fn site(&self, lane: usize) -> Site {
+        let Self {
+            scene,
+            walls,
+            rays,
+            hits,
+        } = self;
+        let point = rays.origin(lane) + rays.direction(lane) * hits.distance_m[lane];
+        scene.site(walls.place(hits.segment[lane] as usize, point))
+    }
+
     /// Where a ray met a wall.
     #[inline]
     pub fn hit(&self, lane: usize) -> Hit {
@@ -53,21 +66,13 @@ impl RayHits<'_> {
     /// The same with the ray's direction along the wall's normal.
     #[inline]
     pub(crate) fn hit_with_direction(&self, lane: usize) -> (Hit, f64) {
-        let Self {
-            scene,
-            walls,
-            rays,
-            hits,
-        } = self;
-        let segment = hits.segment[lane] as usize;
-        let (direction, distance_m) = (rays.direction(lane), hits.distance_m[lane]);
-        let towards = walls.normal(segment).dot(direction);
-        let place = walls.place(segment, rays.origin(lane) + direction * distance_m);
+        let normal = self.walls.normal(self.hits.segment[lane] as usize);
+        let towards = normal.dot(self.rays.direction(lane));
         let hit = Hit {
             sensor: lane,
-            distance_m,
+            distance_m: self.hits.distance_m[lane],
             cos_incidence: towards.abs().min(1.0),
-            site: scene.site(place),
+            site: self.site(lane),
         };
         (hit, towards)
     }

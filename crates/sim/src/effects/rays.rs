@@ -1,8 +1,8 @@
 //! Effects on single rays: how far, how wide and what they meet.
 
-use super::plain::{OnMachine, OnRays};
+use super::plain::OnMachine;
 use super::world::{WALLS, gaussian, is_wall};
-use super::{Effect, Hit, Hook, Param, RayHits, Spec, Stage};
+use super::{Effect, Hit, Hook, Param, RayHits, Site, Spec, Stage};
 use crate::cast::LANES;
 use crate::sensor::power;
 use crate::{Beam, Combine, Readings};
@@ -168,13 +168,41 @@ pub(super) const REFLECTANCE_PATCH: Spec = Spec {
         Param::new("factor", "", 1.0, 0.0, 10.0),
     ],
     list: None,
-    build: || {
-        Box::new(OnRays(|values, hit| {
-            let [wall, position, length_m, factor] = [0, 1, 2, 3].map(|i| values[i]);
-            if !is_wall(wall, hit.site.place.side) {
-                return 1.0;
-            }
-            1.0 + (factor - 1.0) * gaussian(hit.site.arc_m(position), length_m)
-        }))
-    },
+    build: || Box::new(ReflectancePatch),
 };
+
+#[derive(Debug)]
+struct ReflectancePatch;
+
+impl ReflectancePatch {
+    fn factor(values: &[f64], site: &Site) -> f64 {
+        /// Deviations beyond which ten times the bell is nothing beside 1.
+        const REACH: f64 = 9.0;
+        let [position, length_m, factor] = [1, 2, 3].map(|i| values[i]);
+        let arc_m = site.arc_m(position);
+        if arc_m > REACH * length_m {
+            return 1.0;
+        }
+        1.0 + (factor - 1.0) * gaussian(arc_m, length_m)
+    }
+}
+
+impl Effect for ReflectancePatch {
+    fn hooks(&self) -> &'static [Hook] {
+        &[Hook::RayFactors]
+    }
+    fn ray_factor(&self, values: &[f64], hit: &Hit) -> f64 {
+        if is_wall(values[0], hit.site.place.side) {
+            Self::factor(values, &hit.site)
+        } else {
+            1.0
+        }
+    }
+    fn ray_factors(&self, values: &[f64], hits: &RayHits<'_>, factors: &mut Readings) {
+        for lane in hits.lanes() {
+            if is_wall(values[0], hits.side(lane)) {
+                factors[lane] *= Self::factor(values, &hits.site(lane));
+            }
+        }
+    }
+}

@@ -2,6 +2,7 @@
 
 use track::Vec2;
 
+use super::kept::Kept;
 use super::plain::{OnMachine, OnReadings};
 use super::{AZIMUTH, Effect, Hook, Moment, Param, Spec, Stage};
 use crate::cast::LANES;
@@ -141,28 +142,31 @@ pub(super) const SENSOR_LAG: Spec = Spec {
     summary: "first-order low-pass of each reading, before noise, from the first reading on",
     params: &[Param::new("time_s", "s", 0.0, 0.0, 5.0)],
     list: None,
-    build: || Box::new(SensorLag(None)),
+    build: || Box::<SensorLag>::default(),
 };
 
-#[derive(Debug)]
-struct SensorLag(Option<Readings>);
+#[derive(Debug, Default)]
+struct SensorLag {
+    past: Option<Readings>,
+    decay: Kept<2, f64>,
+}
 
 impl Effect for SensorLag {
     fn hooks(&self) -> &'static [Hook] {
         &[Hook::Readings]
     }
     fn readings(&mut self, values: &[f64], now: &Moment, _machine: &Machine, readings: &mut Readings) {
-        let decay = decay(now.step_s, values[0]);
-        let past = self.0.unwrap_or(*readings);
+        let decay = self.decay.of([now.step_s, values[0]], decay);
+        let past = self.past.unwrap_or(*readings);
         for (reading, before) in readings.iter_mut().zip(past) {
             *reading += decay * (before - *reading);
         }
-        self.0 = Some(*readings);
+        self.past = Some(*readings);
     }
 }
 
 /// What is left of a difference after one step of a first-order lag: exp(-step / time), 0 without a lag.
-pub(super) fn decay(step_s: f64, time_s: f64) -> f64 {
+pub(super) fn decay([step_s, time_s]: [f64; 2]) -> f64 {
     if time_s > 0.0 {
         (-step_s / time_s).exp()
     } else {

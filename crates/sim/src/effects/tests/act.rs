@@ -197,7 +197,10 @@ fn slip_memory_keeps_the_variance_and_has_its_correlation() {
     let mut stream = Streams { seed: 5, run: 0 }.open("test");
     let mut next = || {
         let draws = [stream.symmetric(), stream.symmetric()];
-        (draws, memory.effect.slip(&memory.values, draws))
+        (
+            draws,
+            <[f64; 2]>::from(memory.effect.slip(&memory.values, draws.into())),
+        )
     };
     let (draws, first) = next();
     assert_eq!(first, draws, "the first slip is the plain draw");

@@ -112,13 +112,15 @@ fn factors_of_eight_rays_are_those_of_each() {
     let (walls, machine) = (scene().walls(), silent().machine);
     let caster = Caster::new(None, walls, 0.1, 0.05);
     let mut met = 0;
-    for (name, value) in [
-        ("incidence-falloff", 0.0),
-        ("incidence-falloff", 0.7),
-        ("outer-wall-reflectance", 0.4),
-        ("inner-wall-reflectance", 1.3),
+    for (name, values) in [
+        ("incidence-falloff", &[0.0][..]),
+        ("incidence-falloff", &[0.7]),
+        ("outer-wall-reflectance", &[0.4]),
+        ("inner-wall-reflectance", &[1.3]),
+        ("reflectance-patch", &[0.0, 0.3, 0.2, 1.3]),
+        ("reflectance-patch", &[1.0, 0.8, 0.2, 0.0]),
     ] {
-        let Active { effect, values, .. } = active(name, &[value]);
+        let Active { effect, values, .. } = active(name, values);
         for seed in 0..20 {
             let pose = steps(&silent(), 0, seed, 1)[0].0;
             let rays = Rays::new(machine.mounts.map(|mount| (mount.position, mount.axis()))).placed(pose);
@@ -213,6 +215,22 @@ fn patch(values: &[f64], side: Side, fraction: f64) -> f64 {
             site: site(side, fraction),
         },
     )
+}
+
+/// To the last bit: beyond nine deviations the bell is less than half of what tells a number from 1.
+#[test]
+fn a_patch_ends_where_it_is_nothing() {
+    const LENGTH_M: f64 = 0.02;
+    for (i, factor) in (0..400).flat_map(|i| [(i, 0.0), (i, 10.0)]) {
+        let fraction = 0.3 + 1e-3 * f64::from(i);
+        let deviations = site(Side::Outer, fraction).arc_m(0.3) / LENGTH_M;
+        let bell = 1.0 + (factor - 1.0) * (-0.5 * deviations.powi(2)).exp();
+        assert_eq!(
+            patch(&[0.0, 0.3, LENGTH_M, factor], Side::Outer, fraction),
+            bell,
+            "{deviations}"
+        );
+    }
 }
 
 #[test]
