@@ -4,7 +4,7 @@ use crate::World;
 use crate::cast::LANES;
 use crate::noise::{Stream, Streams};
 
-/// What one run draws in its laps, made once for many simulations that meet the same draws: without it an eighth of the time of
+/// What one run draws in its laps, made once for many simulations that meet the same draws: without it a quarter of the time of
 /// laps goes to making them.
 ///
 /// A run that takes longer between two gates than most, or goes farther, makes what the tape lacks itself: whoever drives with a

@@ -26,12 +26,13 @@ pub fn moving_mean(path: &[(f64, Vec2)], half_width_s: f64) -> Vec<(f64, Vec2)> 
     // The rows of the window, whose ends only ever move on, and their sums.
     let (mut from, mut to) = (0, 0);
     let (mut time_s, mut position) = (0.0, Vec2::ZERO);
-    let mean = |row: &(f64, Vec2)| {
+    let mut means = Vec::with_capacity(path.len());
+    for row in path {
         // A billionth more, as times are sums of steps.
         let half_s = half_width_s.min(row.0 - first.0).min(last.0 - row.0) + 1e-9;
-        while to < path.len() && path[to].0 - row.0 <= half_s {
-            time_s += path[to].0;
-            position += path[to].1;
+        while let Some(next) = path.get(to).filter(|next| next.0 - row.0 <= half_s) {
+            time_s += next.0;
+            position += next.1;
             to += 1;
         }
         while row.0 - path[from].0 > half_s {
@@ -40,9 +41,9 @@ pub fn moving_mean(path: &[(f64, Vec2)], half_width_s: f64) -> Vec<(f64, Vec2)> 
             from += 1;
         }
         let share = 1.0 / (to - from) as f64;
-        (time_s * share, position * share)
-    };
-    path.iter().map(mean).collect()
+        means.push((time_s * share, position * share));
+    }
+    means
 }
 
 #[cfg(test)]

@@ -55,8 +55,7 @@ impl Tried {
 
     /// Whether the best leaves nothing that even hints at another one.
     pub(super) fn leaves_no_hint(&self) -> bool {
-        const HINT_P: f64 = 0.1;
-        best_of(&self.descents).is_some_and(|best| best.leaves_more_likely_than(HINT_P))
+        best_of(&self.descents).is_some_and(Descent::leaves_no_hint)
     }
 
     /// Whether the best leaves nothing significant.

@@ -242,8 +242,13 @@ impl Descent {
         self.leaves_more_likely_than(SIGNIFICANT_P)
     }
 
-    /// Whether what is left is as likely as that by chance, as far as a round saw.
-    pub(super) fn leaves_more_likely_than(&self, p: f64) -> bool {
+    /// Whether nothing is left that even hints at another effect, as far as a round saw.
+    pub(super) fn leaves_no_hint(&self) -> bool {
+        const HINT_P: f64 = 0.1;
+        self.leaves_more_likely_than(HINT_P)
+    }
+
+    fn leaves_more_likely_than(&self, p: f64) -> bool {
         (self.remainder).is_some_and(|left| left.omnibus_p() >= p)
     }
 

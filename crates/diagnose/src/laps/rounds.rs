@@ -301,14 +301,20 @@ impl Search<'_> {
         self.with_rivals_hunted(descents)
     }
 
-    /// Descents of which those that are near the best have better sizes of their own of the effects that jump.
+    /// Descents of which those that are near the best have better sizes of their own of the effects that jump; where the best leaves
+    /// no hint of another effect, none can beat it by much, and only those so near that they may come to be as likely.
     fn with_rivals_hunted(&self, mut descents: Vec<Descent>) -> Vec<Descent> {
         const MOST: usize = 2;
+        const CLOSE: f64 = 10.0;
         descents.sort_by(|a, b| b.score.total_cmp(&a.score));
-        let best = descents.first().map_or(0.0, |best| best.score);
+        let Some(best) = descents.first() else {
+            return descents;
+        };
+        let behind = if best.leaves_no_hint() { CLOSE } else { NEAR };
+        let least = best.score - behind;
         let is_rival = |descent: &Descent| {
             let parts = &descent.hypothesis.parts;
-            best - descent.score < NEAR && parts.len() > 1 && parts.iter().any(|part| part.held.is_some())
+            descent.score > least && parts.len() > 1 && parts.iter().any(|part| part.held.is_some())
         };
         let hunted = |rival: &Descent| {
             let hunted = self.trial.hunt_again(&rival.hypothesis, Moved::Little)?;
