@@ -87,7 +87,7 @@ impl Hits {
         segment: [0; LANES],
     };
 
-    /// Those within a range.
+    /// The same without what is beyond a range.
     #[inline(always)]
     fn within(self, range_m: f64) -> Self {
         let limited = |distance_m: f64| {
