@@ -127,39 +127,30 @@ impl Part {
         let p = &atlas.probes[probe];
         let clamped = |size: f64| p.clamped(&p.values(p.quantum.map_or(size, |q| (size / q).round() * q)));
         match shape {
-            Shape::Constant => Self {
-                probe,
-                shape,
-                values: vec![clamped(sizes[0])],
-                per_s: 0.0,
-                stride: 1.0,
-                held: None,
-                tied: None,
-                slopes: None,
-            },
-            Shape::ByRun => Self {
-                probe,
-                shape,
-                values: sizes.iter().map(|&s| clamped(s)).collect(),
-                per_s: 0.0,
-                stride: 1.0,
-                held: None,
-                tied: None,
-                slopes: None,
-            },
+            Shape::Constant => Self::of(probe, shape, vec![clamped(sizes[0])]),
+            Shape::ByRun => Self::of(probe, shape, sizes.iter().map(|&s| clamped(s)).collect()),
             Shape::ByTime => {
                 let per_s = sizes[1] / atlas.lap_s();
+                let at_start = clamped(sizes[0] - per_s * middle_s(atlas));
                 Self {
-                    probe,
-                    shape,
-                    values: vec![clamped(sizes[0] - per_s * middle_s(atlas))],
                     per_s,
-                    stride: 1.0,
-                    held: None,
-                    tied: None,
-                    slopes: None,
+                    ..Self::of(probe, shape, vec![at_start])
                 }
             }
+        }
+    }
+
+    /// A probe with these values, of which nothing else is known.
+    fn of(probe: usize, shape: Shape, values: Vec<Vec<f64>>) -> Self {
+        Self {
+            probe,
+            shape,
+            values,
+            per_s: 0.0,
+            stride: 1.0,
+            held: None,
+            tied: None,
+            slopes: None,
         }
     }
 
@@ -199,14 +190,8 @@ impl Part {
         }
         let largest = multiples.iter().fold(0.0_f64, |most, m| most.max(m.abs()));
         Self {
-            probe: number,
-            shape: Shape::Constant,
-            values: vec![values],
-            per_s: 0.0,
             stride: (0.3 * largest).max(1.0),
-            held: None,
-            tied: None,
-            slopes: None,
+            ..Self::of(number, Shape::Constant, vec![values])
         }
     }
 

@@ -248,6 +248,7 @@ impl Caster {
     /// What the rays hit within the range. `center` is the robot's centre, `walls` those the caster was made for.
     #[inline]
     pub fn cast(&self, walls: &Walls, center: Vec2, rays: &Rays) -> Hits {
+        // Each for itself: hits that are cut to the range after all ways have come together go through memory once more.
         match &self.method {
             Method::Brute => brute(walls, rays).within(self.range_m),
             Method::Bvh(bvh) => bvh.cast(rays, self.range_m).within(self.range_m),

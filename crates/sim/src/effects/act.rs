@@ -27,8 +27,8 @@ pub(super) const COMMAND_DELAY: Spec = Spec {
 struct CommandDelay {
     /// The commands of the last physics steps, the present one first.
     last: VecDeque<WheelSpeeds>,
-    longest: Kept<2, usize>,
-    late: Kept<2, usize>,
+    /// The delay and the longest one, in physics steps.
+    steps: Kept<2, [usize; 2]>,
 }
 
 impl Effect for CommandDelay {
@@ -36,12 +36,12 @@ impl Effect for CommandDelay {
         &[Hook::Drive]
     }
     fn drive(&mut self, values: &[f64], now: &Moment, wheels: WheelSpeeds) -> WheelSpeeds {
-        let steps = |[time_s, step_s]: [f64; 2]| (time_s / step_s).round() as usize;
+        let [late, longest] = self.steps.of([values[0], now.step_s], |[delay_s, step_s]| {
+            [delay_s, LONGEST_DELAY_S].map(|time_s| (time_s / step_s).round() as usize)
+        });
         // All that the longest delay may ask for is kept, because a delay may grow during a run.
-        self.last
-            .truncate(self.longest.of([LONGEST_DELAY_S, now.step_s], steps));
+        self.last.truncate(longest);
         self.last.push_front(wheels);
-        let late = self.late.of([values[0], now.step_s], steps);
         self.last.get(late).copied().unwrap_or_default()
     }
 }
