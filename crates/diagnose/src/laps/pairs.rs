@@ -4,12 +4,12 @@ use nalgebra::{Matrix2, Vector2};
 use rayon::prelude::*;
 
 use super::atlas::Atlas;
-use super::hunt::Hunt;
+use super::hunt::{Hunt, Moved};
 use super::hypothesis::Hypothesis;
 use super::part::Part;
 use super::path::tangent;
 use super::refine::Descent;
-use super::rounds::{ERRORS, ROUNDS_OF_SEVERAL, Rung, best_of};
+use super::rounds::{ERRORS, ROUNDS_OF_SEVERAL, Rung, best_of, is_slow};
 use super::search::{BASES, Found, NEARLY_ALL, STRONG, Search, of_other_effects};
 use super::together::ScreenedPair;
 
@@ -103,12 +103,12 @@ impl Search<'_> {
         let beats_others = |left: f64| self.together().first().is_none_or(|best| left < best.left);
         let jumps_first = hunts.first().is_some_and(|hunt| beats_others(hunt.left));
         if jumps_first {
-            self.descend_on(&mut tried, self.pairs_that_jump(&hunts));
+            self.descend_on_jumping(&mut tried, self.pairs_that_jump(&hunts));
         }
         if let Some(single) = singles.first()
             && !tried.fits()
         {
-            self.descend_on(&mut tried, self.pairs_about(single));
+            self.descend_on_jumping(&mut tried, self.pairs_about(single));
         }
         if !tried.fits() {
             self.try_together(&mut tried, singles);
@@ -128,7 +128,7 @@ impl Search<'_> {
             if hunts.is_empty() {
                 hunts = self.hunts_of_pairs(&self.screened_pairs_that_jump());
             }
-            self.descend_on(&mut tried, self.pairs_that_jump(&hunts));
+            self.descend_on_jumping(&mut tried, self.pairs_that_jump(&hunts));
         }
         self.with_exchanged(tried)
     }
@@ -201,6 +201,38 @@ impl Search<'_> {
         let best = best_of(&tried.descents).map_or(tried.reached, |best| best.score);
         (tried.descents).extend(self.descend_several(&further, tried.rounds, best));
         tried.starts.extend(further);
+    }
+
+    /// The same of pairs with a size that jumps, and from better sizes of the best of them as long as these get on and leave far too
+    /// much: where the other effect has moved since, they may lie some per cent off.
+    fn descend_on_jumping(&self, tried: &mut Tried, further: Vec<Hypothesis>) {
+        const LOOKS: [(Moved, usize); 3] = [(Moved::Far, 2), (Moved::Little, 1), (Moved::Little, 1)];
+        /// Share of what the best leaves by which a pair may lie behind it.
+        const BEHIND: f64 = 0.5;
+        let mut before = tried.descents.len();
+        self.descend_on(tried, further);
+        let mut score = f64::NEG_INFINITY;
+        for (moved, most) in LOOKS {
+            let Some(best) = best_of(&tried.descents).filter(|best| best.leaves_far_too_much()) else {
+                break;
+            };
+            if is_slow(best, best.score - score) {
+                break;
+            }
+            score = best.score;
+            let missing = best.remainder.map_or(0.0, |left| 0.5 * left.excess());
+            let mut near: Vec<&Descent> = (tried.descents[before..].iter())
+                .filter(|descent| descent.score > best.score - BEHIND * missing)
+                .filter(|descent| descent.hypothesis.parts.iter().any(|part| part.held.is_some()))
+                .collect();
+            near.sort_by(|a, b| b.score.total_cmp(&a.score));
+            self.tell(format_args!("closer sizes of what jumps"));
+            let closer = (near.into_iter().take(most))
+                .filter_map(|descent| self.trial.hunt_again(&descent.hypothesis, moved))
+                .collect();
+            before = tried.descents.len();
+            self.descend_on(tried, closer);
+        }
     }
 
     /// Pairs after [`Search::exchange`], tried to the end.

@@ -414,7 +414,7 @@ fn is_hopeless(descent: &Descent) -> bool {
 }
 
 /// Whether a descent that made such progress would not arrive at where it leaves nothing.
-fn is_slow(descent: &Descent, progress: f64) -> bool {
+pub(super) fn is_slow(descent: &Descent, progress: f64) -> bool {
     (descent.remainder).is_some_and(|left| progress < SLOW * 0.5 * left.excess())
 }
 
