@@ -308,7 +308,7 @@ impl Search<'_> {
     /// actions do not quite add up. Few data sets tell which are worth more (a race).
     fn heard_pairs(&self, mut pairs: Vec<ScreenedPair>) -> Vec<ScreenedPair> {
         /// Data sets by which those that are left are told apart, and how many of them then are.
-        const RACE: [(u64, usize); 2] = [(1, 32), (4, 32)];
+        const RACE: [(u64, usize); 2] = [(1, 16), (4, 16)];
         for (sets, taken) in RACE {
             let heard = pairs
                 .into_par_iter()

@@ -252,10 +252,13 @@ impl Descent {
         (self.remainder).is_some_and(|left| left.omnibus_p() >= p)
     }
 
-    /// Whether an earlier look still tells what its numbers do: they moved within its steps, not along noise, and little is
-    /// left, which slopes that are a little off could be taken for.
-    fn knows_its_slopes(&self) -> bool {
-        let clear = (self.near.as_ref()).is_some_and(|(local, _)| !local.is_noisy());
+    /// Whether an earlier look still tells what its numbers do: they moved within its steps, not along noise that another look would
+    /// have less of, and little is left, which slopes that are a little off could be taken for.
+    fn knows_its_slopes(&self, atlas: &Atlas) -> bool {
+        let points = 1 + 2 * self.freedoms.len() as u64;
+        let most = atlas.enough(Round::Full.sets_around(points), points);
+        let is_clear = |local: &Local| !local.is_noisy() || local.center.summaries.len() as u64 >= most;
+        let clear = (self.near.as_ref()).is_some_and(|(local, _)| is_clear(local));
         self.holds && clear && !self.leaves_far_too_much()
     }
 
@@ -328,7 +331,7 @@ impl Trial<'_> {
         let again = match round {
             Round::Rough => false,
             Round::Again => knows_its_place,
-            Round::Full => knows_its_place && descent.knows_its_slopes(),
+            Round::Full => knows_its_place && descent.knows_its_slopes(self.atlas),
         };
         if again && descent.near.is_some() {
             self.look_again(descent, round)
@@ -830,6 +833,31 @@ mod tests {
         assert_eq!(settled.refined.hypothesis, before);
         let rivals = trial.settle_rivals(vec![settled], CLOSE_SETS);
         assert_eq!(rivals[0].evaluated.summaries.len() as u64, sets);
+    }
+
+    #[test]
+    fn noisy_slopes_are_looked_at_again_only_by_more_data_sets() {
+        let atlas = atlas();
+        let runs = simulated(&aside(1.3), 1000, Extent::Whole).unwrap();
+        let data = atlas.observed(&runs).unwrap();
+        // Above a size other draws are met.
+        let noisy = |effects: &[Setting], set: u64, extent: Extent| {
+            let is_above =
+                (effects.iter()).any(|effect| effect.values(0, 0).is_ok_and(|(values, _)| values[0] > 1.3));
+            simulated(effects, if is_above { set + 500 } else { set }, extent)
+        };
+        let trial = Trial::new(&atlas, &noisy, &data);
+        let there = Hypothesis::of(Part::screened(&atlas, 0, Shape::Constant, &[1.3]));
+        let mut descent = Descent::start(&atlas, &there);
+        descent.freedoms[0].step = 0.01;
+        descent.holds = true;
+        let enough = atlas.enough(Round::Full.sets_around(3), 3);
+        for (sets, knows) in [(enough - 1, false), (enough, true)] {
+            let local = trial.local(&there, &descent.freedoms, sets).unwrap();
+            assert!(local.is_noisy());
+            descent.near = Some((local, DVector::zeros(1)));
+            assert_eq!(descent.knows_its_slopes(&atlas), knows, "{sets}");
+        }
     }
 
     #[test]

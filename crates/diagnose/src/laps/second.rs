@@ -94,15 +94,18 @@ impl Search<'_> {
     }
 
     /// The probe of the first of some single effects, where the best of several effects has it and leaves nothing significant, and no other
-    /// single effect explains nearly as much: it is not to be exchanged for others.
+    /// single effect explains nearly as much, and is as little behind as a second effect makes up for: it is not to be exchanged for others.
     fn certain_in(tried: &Tried, found: &[Found]) -> Option<usize> {
+        /// Times what the other effect gains by which another single one may be behind, and come before the first beside some effect.
+        const TIMES: f64 = 2.0;
         let (first, others) = found.split_first()?;
-        let score = |found: &Found| found.explanation.score;
-        let is_rival = |other: &Found| {
-            other.explanation.names() != first.explanation.names() && score(other) > NEARLY * score(first)
-        };
-        let probe = first.hypothesis.parts[0].probe;
         let best = best_of(tried.descents())?;
+        let score = |found: &Found| found.explanation.score;
+        let least = score(first) - TIMES * (best.score - score(first));
+        let least = least.max(NEARLY * score(first));
+        let is_rival =
+            |other: &Found| other.explanation.names() != first.explanation.names() && score(other) > least;
+        let probe = first.hypothesis.parts[0].probe;
         let has_it = best.hypothesis.parts.iter().any(|part| part.probe == probe);
         (has_it && best.fits() && !others.iter().any(is_rival)).then_some(probe)
     }
