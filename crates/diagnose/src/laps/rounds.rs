@@ -279,8 +279,8 @@ impl Search<'_> {
                         return Some(descent);
                     }
                     let start = match moved {
-                        Moved::Far => Descent::start(self.atlas(), &there),
-                        Moved::Little => descent.at(there),
+                        Moved::Far if !rest => Descent::start(self.atlas(), &there),
+                        _ => descent.at(there),
                     };
                     self.trial.descend(start, Round::Full)
                 })
