@@ -133,7 +133,7 @@ impl Trial<'_> {
     /// the next.
     pub(super) fn smoothed(&self, hypothesis: &Hypothesis) -> Hypothesis {
         let mut smooth = hypothesis.clone();
-        if hypothesis.parts.iter().all(|part| part.held.is_none()) {
+        if !hypothesis.has_held() {
             return smooth;
         }
         let own = (self.evaluate(hypothesis, self.atlas.enough(FINAL_SETS, 1)))

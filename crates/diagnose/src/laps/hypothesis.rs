@@ -48,6 +48,11 @@ impl Hypothesis {
         (0..self.parts.len()).filter(has_place)
     }
 
+    /// Whether a size of it was found by trying many.
+    pub(super) fn has_held(&self) -> bool {
+        self.parts.iter().any(|part| part.held.is_some())
+    }
+
     /// Whether no size goes over the runs or in time.
     pub(super) fn is_constant(&self) -> bool {
         self.parts.iter().all(|part| part.shape == Shape::Constant)

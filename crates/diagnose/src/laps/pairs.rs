@@ -209,28 +209,26 @@ impl Search<'_> {
         const LOOKS: [(Moved, usize); 3] = [(Moved::Far, 2), (Moved::Little, 1), (Moved::Little, 1)];
         /// Share of what the best leaves by which a pair may lie behind it.
         const BEHIND: f64 = 0.5;
-        let mut before = tried.descents.len();
+        let mut known = tried.descents.len();
         self.descend_on(tried, further);
-        let mut score = f64::NEG_INFINITY;
+        let mut before = f64::NEG_INFINITY;
         for (moved, most) in LOOKS {
             let Some(best) = best_of(&tried.descents).filter(|best| best.leaves_far_too_much()) else {
                 break;
             };
-            if is_slow(best, best.score - score) {
+            let least = best.score - BEHIND * best.remainder.map_or(0.0, |left| 0.5 * left.excess());
+            let mut near: Vec<&Descent> = (tried.descents[known..].iter())
+                .filter(|descent| descent.score > least && descent.hypothesis.has_held())
+                .collect();
+            if near.is_empty() || is_slow(best, best.score - before) {
                 break;
             }
-            score = best.score;
-            let missing = best.remainder.map_or(0.0, |left| 0.5 * left.excess());
-            let mut near: Vec<&Descent> = (tried.descents[before..].iter())
-                .filter(|descent| descent.score > best.score - BEHIND * missing)
-                .filter(|descent| descent.hypothesis.parts.iter().any(|part| part.held.is_some()))
-                .collect();
             near.sort_by(|a, b| b.score.total_cmp(&a.score));
             self.tell(format_args!("closer sizes of what jumps"));
             let closer = (near.into_iter().take(most))
                 .filter_map(|descent| self.trial.hunt_again(&descent.hypothesis, moved))
                 .collect();
-            before = tried.descents.len();
+            (known, before) = (tried.descents.len(), best.score);
             self.descend_on(tried, closer);
         }
     }

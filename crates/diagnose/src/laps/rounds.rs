@@ -246,7 +246,6 @@ impl Search<'_> {
         const SHARE: f64 = 0.03;
         const CLOSE: f64 = 15.0;
         const MOST: [usize; 2] = [4, 2];
-        let held = |part: &Part| part.held.is_some();
         for look in 0..2 * LOOKS {
             let Some(best) = best_of(&descents) else {
                 break;
@@ -257,7 +256,7 @@ impl Search<'_> {
             } else {
                 (Moved::Little, CLOSE, MOST[1])
             };
-            if best.parts.len() < 2 || !best.parts.iter().any(held) {
+            if best.parts.len() < 2 || !best.has_held() {
                 break;
             }
             self.tell(format_args!("closer sizes of what jumps"));
@@ -266,7 +265,9 @@ impl Search<'_> {
             };
             let rest =
                 (hunted.parts.iter().zip(&best.parts)).all(|(now, before)| now.is_within_error_of(before));
-            let known: Vec<Part> = hunted.parts.into_iter().filter(held).collect();
+            let known: Vec<Part> = (hunted.parts.into_iter())
+                .filter(|part| part.held.is_some())
+                .collect();
             let least = before - behind;
             descents.sort_by(|a, b| b.score.total_cmp(&a.score));
             descents = (descents.into_par_iter().enumerate())
@@ -313,8 +314,8 @@ impl Search<'_> {
         let behind = if best.leaves_no_hint() { CLOSE } else { NEAR };
         let least = best.score - behind;
         let is_rival = |descent: &Descent| {
-            let parts = &descent.hypothesis.parts;
-            descent.score > least && parts.len() > 1 && parts.iter().any(|part| part.held.is_some())
+            let hypothesis = &descent.hypothesis;
+            descent.score > least && hypothesis.parts.len() > 1 && hypothesis.has_held()
         };
         let hunted = |rival: &Descent| {
             let hunted = self.trial.hunt_again(&rival.hypothesis, Moved::Little)?;

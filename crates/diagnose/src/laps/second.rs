@@ -161,7 +161,7 @@ impl Search<'_> {
     fn with_closer_sizes(&self, found: &Found) -> Option<Found> {
         /// Log-likelihood that is worth it.
         const BETTER: f64 = 5.0;
-        if found.hypothesis.parts.iter().all(|part| part.held.is_none()) {
+        if !found.hypothesis.has_held() {
             return None;
         }
         self.tell(format_args!("closer sizes of {}", found.explanation.label()));
