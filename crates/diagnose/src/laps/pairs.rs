@@ -188,12 +188,10 @@ impl Search<'_> {
     /// either of its own.
     fn explains_most(&self, tried: &Tried) -> bool {
         const LITTLE: f64 = 0.1;
-        let all = self.excess(self.residual);
-        let left = |best: &Descent| best.remainder.map(|left| left.excess());
         best_of(&tried.descents)
             .filter(|best| best.score > STRONG && !best.leaves_far_too_much())
-            .and_then(left)
-            .is_some_and(|left| left < LITTLE * all)
+            .and_then(Descent::missing)
+            .is_some_and(|missing| missing < LITTLE * self.signal())
     }
 
     /// Descends from further hypotheses.
@@ -216,7 +214,7 @@ impl Search<'_> {
             let Some(best) = best_of(&tried.descents).filter(|best| best.leaves_far_too_much()) else {
                 break;
             };
-            let least = best.score - BEHIND * best.remainder.map_or(0.0, |left| 0.5 * left.excess());
+            let least = best.score - BEHIND * best.missing().unwrap_or_default();
             let mut near: Vec<&Descent> = (tried.descents[known..].iter())
                 .filter(|descent| descent.score > least && descent.hypothesis.has_held())
                 .collect();
@@ -305,15 +303,16 @@ impl Search<'_> {
     /// The best of the pairs that were screened, with the scores and sizes that simulations of both together give them, best first:
     /// actions do not quite add up. Few data sets tell which are worth more (a race).
     fn heard_pairs(&self, mut pairs: Vec<ScreenedPair>) -> Vec<ScreenedPair> {
-        /// Data sets by which those that are left are told apart, and how many of them then are.
-        const RACE: [(u64, usize); 2] = [(1, 16), (4, 16)];
-        for (sets, taken) in RACE {
+        /// Data sets by which those that are left are told apart, and how many are.
+        const RACE: [u64; 2] = [1, 4];
+        const LEFT: usize = 16;
+        for sets in RACE {
             let heard = pairs
                 .into_par_iter()
                 .filter_map(|pair| self.heard_pair(pair, sets));
             pairs = heard.collect();
             pairs.sort_by(|a, b| b.score.total_cmp(&a.score));
-            pairs.truncate(taken);
+            pairs.truncate(LEFT);
         }
         pairs
     }

@@ -232,6 +232,11 @@ impl Descent {
         ERRORS_BEHIND * error.hypot(self.score_error)
     }
 
+    /// The log-likelihood that it lacks of leaving what chance does, if a round saw what it leaves.
+    pub(super) fn missing(&self) -> Option<f64> {
+        self.remainder.map(|left| 0.5 * left.excess())
+    }
+
     /// Whether nothing short of another effect would help, as far as a round saw.
     pub(super) fn leaves_far_too_much(&self) -> bool {
         (self.remainder).is_some_and(|left| left.omnibus_p() < HOPELESS_P)

@@ -416,7 +416,7 @@ fn is_hopeless(descent: &Descent) -> bool {
 
 /// Whether a descent that made such progress would not arrive at where it leaves nothing.
 pub(super) fn is_slow(descent: &Descent, progress: f64) -> bool {
-    (descent.remainder).is_some_and(|left| progress < SLOW * 0.5 * left.excess())
+    descent.missing().is_some_and(|missing| progress < SLOW * missing)
 }
 
 /// Whether a descent is near a better one, or comes nearer.

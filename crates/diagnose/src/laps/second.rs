@@ -93,8 +93,8 @@ impl Search<'_> {
         self.beside_found(others.filter(|other| other.explanation.score > least), tried)
     }
 
-    /// The probe of the first of some single effects, where the best of several effects has it and leaves nothing significant, and no other
-    /// single effect explains nearly as much, and is as little behind as a second effect makes up for: it is not to be exchanged for others.
+    /// The probe of the first of some single effects, where the best of several effects has it and leaves nothing significant, and every
+    /// other single effect explains clearly less, or is farther behind than a second one would make up for: it is not to be exchanged.
     fn certain_in(tried: &Tried, found: &[Found]) -> Option<usize> {
         /// Times what the other effect gains by which another single one may be behind, and come before the first beside some effect.
         const TIMES: f64 = 2.0;
