@@ -5,6 +5,7 @@ use std::sync::Arc;
 use track::Vec2;
 
 use crate::cast::{Hits, Rays};
+use crate::cones::Cones;
 use crate::effects::{Active, Chain, Hook, RayHits, Stage};
 use crate::world::{Geometry, World, altered};
 use crate::{Error, Machine, Pose, Readings, Setting};
@@ -23,6 +24,8 @@ pub(crate) struct Apparatus<'w> {
     pub(crate) effects: Chain,
     pub(crate) machine: Machine,
     pub(crate) sights: Vec<Sight>,
+    /// Most of the same rays by sensors, where these have many and hold still among walls that do.
+    pub(crate) cones: Option<&'w Cones>,
     pub(crate) geometry: Arc<Geometry>,
     /// Whether an effect must be asked for every ray.
     pub(crate) weighs_rays: bool,
@@ -44,10 +47,11 @@ impl<'w> Apparatus<'w> {
         let effects = Chain::new(&settings, world.run)?;
         let all = effects.all();
         let machine = altered(&world.model.machine, all);
-        Ok(Self {
+        let mut apparatus = Self {
             world,
             geometry: Arc::clone(&world.geometry),
             sights: sights(&machine),
+            cones: None,
             displacing: on_walls(further, world.run)?,
             cutting: on_walls(own, world.run)?,
             drifting: all.iter().any(Active::drifts),
@@ -56,7 +60,11 @@ impl<'w> Apparatus<'w> {
             weighs_rays: effects.has(Hook::RayFactors),
             effects,
             steps: 0,
-        })
+        };
+        if !apparatus.moves() {
+            apparatus.cones = world.cones.as_ref();
+        }
+        Ok(apparatus)
     }
 
     /// Whether walls or sensors may move in time.
@@ -111,6 +119,12 @@ impl<'w> Apparatus<'w> {
         let Geometry { caster, walls, .. } = &*self.geometry;
         let hits = caster.cast(walls, pose.position, &rays);
         (rays, hits)
+    }
+
+    /// Most rays of sensors that have many, pack by pack, as long as nothing but their distances matters.
+    #[inline]
+    pub(crate) fn cones(&self) -> Option<&'w Cones> {
+        self.cones.filter(|_| !self.weighs_rays)
     }
 
     /// What the effects make of the responses of the rays; anything of one that met no wall.

@@ -11,6 +11,7 @@ extern crate self as sim;
 
 mod apparatus;
 mod cast;
+mod cones;
 mod controller;
 mod cut;
 mod effects;

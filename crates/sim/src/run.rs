@@ -7,6 +7,7 @@ use track::{Lap, LapTracker, Vec2, Way};
 
 use crate::apparatus::Apparatus;
 use crate::cast::LANES;
+use crate::cones::Cones;
 #[cfg(test)]
 use crate::effects::Hook;
 use crate::effects::Moment;
@@ -126,6 +127,12 @@ impl<'w> Run<'w> {
         self.apparatus.weighs_rays = self.apparatus.effects.has(Hook::RayFactors);
     }
 
+    /// Has each ray of all sensors cast for itself from now on, however many rays they have.
+    #[cfg(test)]
+    pub(crate) fn cast_ray_by_ray(&mut self) {
+        self.apparatus.cones = None;
+    }
+
     /// Drives for one control step.
     pub fn step(&mut self) -> Step {
         let time_s = self.start_s + self.steps as f64 * self.apparatus.world.rules().control_step_s;
@@ -197,8 +204,14 @@ impl<'w> Run<'w> {
         let Machine {
             range_m, response, ..
         } = &self.apparatus.machine;
-        let mut total = [0.0; LANES];
-        for sight in &self.apparatus.sights {
+        let (mut total, rest) = match self.apparatus.cones() {
+            Some(cones) => (
+                self.mean_response_of(cones),
+                &self.apparatus.sights[cones.sights()..],
+            ),
+            None => ([0.0; LANES], &self.apparatus.sights[..]),
+        };
+        for sight in rest {
             let (rays, hits) = self.apparatus.cast(self.pose, sight);
             let mut values = response.readings(&hits.distance_m);
             for (value, distance_m) in values.iter_mut().zip(hits.distance_m) {
@@ -217,14 +230,40 @@ impl<'w> Run<'w> {
         total
     }
 
+    /// The share in that of the rays that are cast by sensors.
+    #[inline(never)]
+    fn mean_response_of(&self, cones: &Cones) -> Readings {
+        let Machine {
+            range_m, response, ..
+        } = &self.apparatus.machine;
+        let mut total = [0.0; LANES];
+        cones.cast(&self.apparatus.geometry.walls, self.pose, |pack, distances_m| {
+            if distances_m.iter().any(|distance_m| distance_m <= range_m) {
+                let values = response.readings(distances_m);
+                for ray in 0..LANES {
+                    let seen = distances_m[ray] <= *range_m;
+                    total[pack.sensor] += pack.weights[ray] * if seen { values[ray] } else { 0.0 };
+                }
+            }
+        });
+        total
+    }
+
     /// Response of the weighted mean of each sensor's distances, times the mean of what effects make of its rays.
     #[inline]
     fn response_of_mean_distance(&self) -> Readings {
         let Machine {
             range_m, response, ..
         } = &self.apparatus.machine;
-        let (mut mean, mut factor) = ([0.0; LANES], [1.0; LANES]);
-        for sight in &self.apparatus.sights {
+        let (mut mean, rest) = match self.apparatus.cones() {
+            Some(cones) => (
+                self.mean_distance_of(cones),
+                &self.apparatus.sights[cones.sights()..],
+            ),
+            None => ([0.0; LANES], &self.apparatus.sights[..]),
+        };
+        let mut factor = [1.0; LANES];
+        for sight in rest {
             let (rays, hits) = self.apparatus.cast(self.pose, sight);
             for (mean, d) in mean.iter_mut().zip(hits.distance_m) {
                 *mean += sight.weight * d.min(*range_m);
@@ -240,6 +279,19 @@ impl<'w> Run<'w> {
         let seen = |d: f64| d < range_m * (1.0 - 1e-12);
         let values = response.readings(&mean);
         std::array::from_fn(|i| if seen(mean[i]) { factor[i] * values[i] } else { 0.0 })
+    }
+
+    /// The share in the mean distances of the rays that are cast by sensors.
+    #[inline(never)]
+    fn mean_distance_of(&self, cones: &Cones) -> [f64; LANES] {
+        let range_m = self.apparatus.machine.range_m;
+        let mut mean = [0.0; LANES];
+        cones.cast(&self.apparatus.geometry.walls, self.pose, |pack, distances_m| {
+            for ray in 0..LANES {
+                mean[pack.sensor] += pack.weights[ray] * distances_m[ray].min(range_m);
+            }
+        });
+        mean
     }
 
     /// The physics steps of one control step.

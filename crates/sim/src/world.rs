@@ -5,6 +5,7 @@ use std::sync::Arc;
 use track::{Chain, Course, Direction, Gates, Side, Vec2, Vertex, Way};
 
 use crate::cast::{Caster, CasterKind, Cells};
+use crate::cones::Cones;
 use crate::effects::{Active, Site};
 use crate::{Error, Machine, Model, ReadingNoise, RunRules, WallPlace, WallRules, Walls};
 
@@ -172,6 +173,7 @@ impl Scene {
         let geometry = self.geometry(&effects, &machine);
         Ok(World {
             scene: self,
+            cones: Cones::new(&machine, &geometry.walls, self.kind),
             model: model.clone(),
             run,
             machine,
@@ -304,6 +306,8 @@ pub struct World<'s> {
     /// The machine at the run's start.
     pub(crate) machine: Machine,
     pub(crate) geometry: Arc<Geometry>,
+    /// The rays of its sensors, if these have many.
+    pub(crate) cones: Option<Cones>,
 }
 
 impl World<'_> {

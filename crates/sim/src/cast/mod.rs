@@ -225,12 +225,17 @@ impl Caster {
     /// Prepares the walls for rays of at most `range_m` that start within `spread_m` of the robot's centre; `None`
     /// chooses the kind by the walls.
     pub fn new(kind: Option<CasterKind>, walls: &Walls, range_m: f64, spread_m: f64) -> Self {
+        Self::about_disc(kind, walls, range_m, range_m + spread_m)
+    }
+
+    /// The same for rays that stay within a disc of `disc_m` about a point.
+    pub(crate) fn about_disc(kind: Option<CasterKind>, walls: &Walls, range_m: f64, disc_m: f64) -> Self {
         let kind = kind.unwrap_or_else(|| CasterKind::for_walls(walls, range_m));
         let method = match kind {
             CasterKind::Brute => Method::Brute,
             CasterKind::Bvh => Method::Bvh(Box::new(bvh::Bvh::new(walls))),
-            CasterKind::Cells => Method::Cells(Cells::new(walls, range_m + spread_m)),
-            CasterKind::Tree => Method::Tree(tree::Tree::new(walls, range_m + spread_m)),
+            CasterKind::Cells => Method::Cells(Cells::new(walls, disc_m)),
+            CasterKind::Tree => Method::Tree(tree::Tree::new(walls, disc_m)),
         };
         Self { method, range_m }
     }
@@ -245,7 +250,7 @@ impl Caster {
         }
     }
 
-    /// What the rays hit within the range. `center` is the robot's centre, `walls` those the caster was made for.
+    /// What the rays hit within the range. `center` is the robot's centre, or that of the disc, `walls` those the caster was made for.
     #[inline]
     pub fn cast(&self, walls: &Walls, center: Vec2, rays: &Rays) -> Hits {
         // Each for itself: hits that are cut to the range after all ways have come together go through memory once more.
