@@ -1,6 +1,6 @@
 //! Effects whose action jumps with their size, at sizes all over their range: derivatives say nothing of them.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
 use nalgebra::DMatrix;
@@ -382,15 +382,18 @@ impl Search<'_> {
         }
     }
 
-    /// The probes that explain best what a single effect leaves, by paths, each at its smallest sizes.
+    /// The probes that explain best what a single effect leaves, by paths, each at its smallest sizes: of every effect the best one, and
+    /// the best of all.
     fn likely_beside(&self, single: &Found) -> Vec<(usize, f64)> {
         /// Three times as far as right ones were down the list beside an effect that jumps: paths were simulated without it.
         const LIKELY: usize = 60;
         let base = self.trial.base(single.hypothesis.clone());
         let screened = self.screened_beside(&base, &single.left);
         let constant = screened.iter().filter(|other| other.hypothesis.is_constant());
-        let probes = constant.map(|other| other.probe());
-        let likely: Vec<usize> = probes.take(LIKELY).collect();
+        let mut effects = BTreeSet::new();
+        let (best_of_effect, others): (Vec<usize>, Vec<usize>) = (constant.map(|other| other.probe()))
+            .partition(|&probe| effects.insert(self.atlas().probes[probe].spec.name));
+        let likely: Vec<usize> = best_of_effect.into_iter().chain(others).take(LIKELY).collect();
         let mut sizes = self.atlas().smallest_sizes();
         sizes.retain(|(probe, _)| likely.contains(probe));
         sizes

@@ -22,9 +22,6 @@ impl Search<'_> {
     /// The best pairs of a single effect that explains nearly all, the first of those found, tried to the end: those with what explains
     /// best what it leaves. A size that jumps is looked for more closely first, and is then the first of those found.
     pub(super) fn pairs_with_first(&self, found: &mut Vec<Found>) -> Vec<Found> {
-        while let Some(closer) = found.first().and_then(|single| self.with_closer_sizes(single)) {
-            found.insert(0, closer);
-        }
         let Some(single) = found.first() else {
             return Vec::new();
         };
@@ -49,6 +46,10 @@ impl Search<'_> {
                     return self.settle_roughly(descents);
                 }
                 Promise::Enough(pairs) => {
+                    if let Some(closer) = self.with_closer_sizes(single) {
+                        found.insert(0, closer);
+                        return self.pairs_with_first(found);
+                    }
                     promises = true;
                     self.descend_on(&mut tried, pairs);
                     if stands_alone(&single.explanation) {
