@@ -374,8 +374,11 @@ impl Search<'_> {
                 self.tell(format_args!("sizes about that of {}", single.explanation.label()));
                 let left = self.excess(&single.residual) / self.chance();
                 let likely = self.likely_beside(single);
-                let screened =
+                let mut screened =
                     (self.trial).screen_about(&likely, (part.probe, part.mean_size(self.atlas())), left);
+                let missing = |beside: &Beside| 2.0 * (self.signal() - beside.score);
+                let least = screened.iter().map(missing).fold(f64::INFINITY, f64::min);
+                screened.retain(|beside| missing(beside) <= least + may_be_behind(least));
                 self.pairs_that_jump(&self.hunts_of_pairs(&screened))
             }
             _ => Vec::new(),
@@ -416,10 +419,8 @@ impl Search<'_> {
         const KEPT: usize = 3;
         /// Looks closer before the other effect's size follows.
         const LOOKS: usize = 2;
-        /// Squared distance, and the share of what the best leaves, by which a pair may lie behind it.
-        const BEHIND: (f64, f64) = (100.0, 0.5);
         let least = hunts.first().map_or(0.0, |hunt| hunt.left);
-        let bound = least + BEHIND.0.max(BEHIND.1 * (least - self.chance()));
+        let bound = least + may_be_behind(least - self.chance());
         (hunts.iter().take(KEPT).filter(|hunt| hunt.left <= bound))
             .filter_map(|hunt| self.trial.hunted_for(hunt, LOOKS))
             .collect()
@@ -534,6 +535,13 @@ impl Search<'_> {
     fn jumping(&self) -> impl Iterator<Item = usize> {
         (0..self.atlas().probes.len()).filter(|&probe| self.atlas().probes[probe].jumps())
     }
+}
+
+/// The squared distance by which a pair may lie behind the best one, by what that leaves beyond chance.
+fn may_be_behind(excess: f64) -> f64 {
+    const LEAST: f64 = 100.0;
+    const SHARE: f64 = 0.5;
+    LEAST.max(SHARE * excess)
 }
 
 /// So many sizes between two in a constant ratio, and that: what matters is how many steps fit into a speed or a reading.
