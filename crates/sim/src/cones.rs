@@ -9,7 +9,9 @@ use crate::{Machine, Mount, Pose, Walls};
 #[derive(Debug)]
 pub(crate) struct Cones {
     packs: Vec<Pack>,
+    /// For discs as large as the largest one about a pack.
     caster: Caster,
+    /// How many of each sensor's rays are in packs: the first ones.
     sights: usize,
 }
 
@@ -49,7 +51,7 @@ impl Cones {
         })
     }
 
-    /// How many of each sensor's rays are among these: the first ones.
+    /// How many of each sensor's rays are in packs: the first ones.
     pub(crate) fn sights(&self) -> usize {
         self.sights
     }
