@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 
 use track::{Lap, LapTracker, Vec2, Way};
 
-use crate::apparatus::Apparatus;
+use crate::apparatus::{Apparatus, Sight};
 use crate::cast::LANES;
 use crate::cones::Cones;
 #[cfg(test)]
@@ -198,19 +198,23 @@ impl<'w> Run<'w> {
         }
     }
 
+    /// The share of the rays that are cast by sensors in what each sensor's rays add up to, and the sights that are left.
+    #[inline(always)]
+    fn after_cones(&self, share: fn(&Self, &Cones) -> [f64; LANES]) -> ([f64; LANES], &[Sight]) {
+        let sights = &self.apparatus.sights;
+        match self.apparatus.cones() {
+            Some(cones) => (share(self, cones), &sights[cones.sights()..]),
+            None => ([0.0; LANES], sights),
+        }
+    }
+
     /// Weighted mean of the responses of each sensor's rays.
     #[inline]
     fn mean_response(&self) -> Readings {
         let Machine {
             range_m, response, ..
         } = &self.apparatus.machine;
-        let (mut total, rest) = match self.apparatus.cones() {
-            Some(cones) => (
-                self.mean_response_of(cones),
-                &self.apparatus.sights[cones.sights()..],
-            ),
-            None => ([0.0; LANES], &self.apparatus.sights[..]),
-        };
+        let (mut total, rest) = self.after_cones(Self::mean_response_of);
         for sight in rest {
             let (rays, hits) = self.apparatus.cast(self.pose, sight);
             let mut values = response.readings(&hits.distance_m);
@@ -255,13 +259,7 @@ impl<'w> Run<'w> {
         let Machine {
             range_m, response, ..
         } = &self.apparatus.machine;
-        let (mut mean, rest) = match self.apparatus.cones() {
-            Some(cones) => (
-                self.mean_distance_of(cones),
-                &self.apparatus.sights[cones.sights()..],
-            ),
-            None => ([0.0; LANES], &self.apparatus.sights[..]),
-        };
+        let (mut mean, rest) = self.after_cones(Self::mean_distance_of);
         let mut factor = [1.0; LANES];
         for sight in rest {
             let (rays, hits) = self.apparatus.cast(self.pose, sight);
