@@ -7,7 +7,6 @@ use sim::{Controller, Setting, Stage, Step, Streams};
 use super::Trace;
 use super::answer::rivals;
 use super::recording::{Recording, RunPlace, Seeds};
-use super::tapes::Tapes;
 use crate::config::Config;
 use crate::interrupt;
 use crate::setup::Setup;
@@ -175,7 +174,7 @@ fn looked_at(
             continue;
         };
         if with != With::Logs {
-            let separations = by_laps(&setup, answer, others, seed);
+            let separations = by_laps(recording, &setup, answer, others, seed);
             found.extend(separations.map(|separations| Experiment {
                 name: name.clone(),
                 declared: declared.clone(),
@@ -223,6 +222,7 @@ fn changed(recording: &Recording, declared: &[(&'static str, String)]) -> Option
 }
 
 fn by_laps(
+    recording: &Recording,
     setup: &Setup,
     answer: &Explanation,
     others: &[&Explanation],
@@ -236,7 +236,7 @@ fn by_laps(
             begins: true,
         };
         let runs = (0..RUNS).map(|run| (LAPS, anywhere(run)));
-        Recording::drive(setup, effects, Seeds { session: seed, set }, &Tapes::NONE, runs)
+        recording.drive(setup, effects, Seeds { session: seed, set }, runs)
     };
     let rivals: Vec<Rival> = (others.iter())
         .map(|other| Rival {

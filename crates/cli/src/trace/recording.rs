@@ -327,15 +327,15 @@ impl Recording {
     ) -> Option<Vec<ObservedRun>> {
         let runs = extent.runs(places.len());
         let places = self.shape().into_iter().zip(places);
-        Self::drive(setup, effects, seeds, &self.tapes, places.take(runs))
+        self.drive(setup, effects, seeds, places.take(runs))
     }
 
-    /// One simulated data set: so many laps of a run at each place.
+    /// One simulated data set of a setup whose robots draw as the recording's do: so many laps of a run at each place.
     pub(super) fn drive<'a>(
+        &self,
         setup: &Setup,
         effects: &[Setting],
         seeds: Seeds,
-        tapes: &Tapes,
         runs: impl Iterator<Item = (usize, RunPlace<'a>)>,
     ) -> Option<Vec<ObservedRun>> {
         if interrupt::check().is_err() {
@@ -345,7 +345,7 @@ impl Recording {
         model.effects.extend_from_slice(effects);
         let run = |(run, (laps, place)): (usize, (usize, RunPlace<'_>))| {
             let world = setup.scene.world(&model, place.number).ok()?;
-            let draws = tapes.draws(&world, seeds, run, laps);
+            let draws = self.tapes.draws(&world, seeds, run, laps);
             let (closed, path) = place.drive(setup, &world, draws, laps).ok()?;
             (closed.len() == laps).then(|| place.observed(setup, closed, &path))
         };

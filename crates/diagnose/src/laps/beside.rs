@@ -113,21 +113,38 @@ impl Trial<'_> {
     /// What the numbers of a hypothesis do, as orthonormal directions in units of a scatter.
     fn directions(&self, hypothesis: &Hypothesis, scatter: &[Scatter]) -> Vec<White> {
         const SETS: u64 = 4;
-        let mut directions: Vec<White> = Vec::new();
-        for group in groups(&hypothesis.freedoms(self.atlas)) {
+        let layout = &self.atlas.layout;
+        let simulated = |group: &[Freedom]| -> Option<Vec<White>> {
             let at = |sign: f64| {
                 let moves: Vec<(Freedom, f64)> = group.iter().map(|f| (*f, sign * f.step)).collect();
                 let moved = hypothesis.moved(self.atlas, &moves);
                 self.simulated_plainly(&moved.settings(self.atlas), 0..SETS)
             };
-            let (Some(up), Some(down)) = (at(1.0), at(-1.0)) else {
-                continue;
-            };
-            let action = white(scatter, &self.atlas.layout, &up, &down);
-            for freedom in &group {
-                let own = freedom.own_share(&action, &self.atlas.layout);
-                directions.extend(without_directions(own, &directions).try_normalize(f64::MIN_POSITIVE));
+            let action = white(scatter, layout, &at(1.0)?, &at(-1.0)?);
+            Some(group.iter().map(|f| f.own_share(&action, layout)).collect())
+        };
+        let of_part = |freedoms: &[Freedom]| -> Vec<White> {
+            let part = &hypothesis.parts[freedoms[0].part];
+            let seen = part
+                .slopes
+                .as_ref()
+                .and_then(|slopes| slopes.seen_from(part, self.atlas));
+            match seen {
+                Some(seen) => (seen.in_units_of(scatter, layout).into_iter())
+                    .map(|column| column.slope)
+                    .collect(),
+                None => groups(freedoms)
+                    .iter()
+                    .filter_map(|group| simulated(group))
+                    .flatten()
+                    .collect(),
             }
+        };
+        let freedoms = hypothesis.freedoms(self.atlas);
+        let parts = freedoms.chunk_by(|a, b| a.part == b.part);
+        let mut directions: Vec<White> = Vec::new();
+        for along in parts.flat_map(of_part) {
+            directions.extend(without_directions(along, &directions).try_normalize(f64::MIN_POSITIVE));
         }
         directions
     }
@@ -242,49 +259,60 @@ impl Search<'_> {
     }
 
     /// The best of what was screened beside a base, at the sizes and with the scores that simulations give them: paths were
-    /// simulated without the base, and actions do not quite add up.
+    /// simulated without the base, and actions do not quite add up. One group of data sets tells of which another is worth it.
     pub(super) fn heard_beside(&self, base: &Base, screened: Vec<Screened>) -> Vec<Screened> {
         const HEARD: usize = 16;
+        const HEARD_TWICE: usize = 8;
         const OF_ONE_EFFECT: usize = 2;
         const SHARE: f64 = 0.4;
         /// Data sets whose noise is not the same.
         const DRAWS: [Draws; 2] = [Draws::Sets(0..4), Draws::Sets(4..8)];
-        let spec_of = |probe: usize| self.atlas().probes[probe].spec;
-        let turned = |left: [White; 2]| left.map(|left| self.atlas().turned(&left));
-        let left = |further: &[Setting]| self.trial.left_twice(base, further, &DRAWS).map(turned);
-        let (Some(first), Some(left_by_base)) = (screened.first(), left(&[])) else {
+        let atlas = self.atlas();
+        let spec_of = |probe: usize| atlas.probes[probe].spec;
+        let left = |further: &[Setting], draws: &Draws| {
+            let left = self.trial.left_beside(base, further, draws)?;
+            Some(atlas.turned(&left))
+        };
+        let [by_first, by_second] = DRAWS.each_ref().map(|draws| left(&[], draws));
+        let (Some(best), Some(by_first), Some(by_second)) = (screened.first(), by_first, by_second) else {
             return screened;
         };
-        let mut heard: Vec<usize> = Vec::new();
-        for candidate in screened
-            .iter()
-            .filter(|candidate| candidate.may_win(first, SHARE))
-        {
+        let mut heard: Vec<&Screened> = Vec::new();
+        for candidate in screened.iter().filter(|candidate| candidate.may_win(best, SHARE)) {
             let probe = candidate.probe();
-            let alike = heard.iter().filter(|&&other| spec_of(other) == spec_of(probe));
-            if heard.len() < HEARD && !heard.contains(&probe) && alike.count() < OF_ONE_EFFECT {
-                heard.push(probe);
+            let is_known = heard.iter().any(|other| other.probe() == probe);
+            let alike = (heard.iter()).filter(|other| spec_of(other.probe()) == spec_of(probe));
+            if heard.len() < HEARD && !is_known && alike.count() < OF_ONE_EFFECT {
+                let constant = |s: &&Screened| s.probe() == probe && s.hypothesis.is_constant();
+                heard.extend(screened.iter().find(constant));
             }
         }
-        let simulated: BTreeMap<usize, Option<(f64, f64)>> = (heard.into_par_iter())
-            .map(|probe| {
-                let constant = |s: &&Screened| s.probe() == probe && s.hypothesis.is_constant();
-                let constant = screened.iter().find(constant);
-                let best = constant.and_then(|constant| {
-                    let with = left(&constant.hypothesis.settings(self.atlas()))?;
-                    let (multiple, gain) = self.gain_beside(base, constant, &left_by_base, &with);
-                    let score = self.atlas().score_of_constant(probe, gain);
-                    Some((multiple, score - constant.score))
-                });
-                (probe, best)
+        // With the first group alone its noise, which candidates share, counts as gained.
+        let once = [by_first.clone(), by_first.clone()];
+        let mut first: Vec<(&Screened, White, f64)> = (heard.into_par_iter())
+            .filter_map(|constant| {
+                let with = left(&constant.hypothesis.settings(atlas), &DRAWS[0])?;
+                let (_, gain) = self.gain_beside(base, constant, &once, &[with.clone(), with.clone()]);
+                Some((constant, with, atlas.score_of_constant(constant.probe(), gain)))
+            })
+            .collect();
+        first.sort_by(|a, b| b.2.total_cmp(&a.2));
+        first.truncate(HEARD_TWICE);
+        let without = [by_first, by_second];
+        let simulated: BTreeMap<usize, (f64, f64)> = (first.into_par_iter())
+            .filter_map(|(constant, with, _)| {
+                let probe = constant.probe();
+                let again = left(&constant.hypothesis.settings(atlas), &DRAWS[1])?;
+                let (multiple, gain) = self.gain_beside(base, constant, &without, &[with, again]);
+                let score = atlas.score_of_constant(probe, gain);
+                Some((probe, (multiple, score - constant.score)))
             })
             .collect();
         let corrected = |mut candidate: Screened| {
-            let probe = candidate.probe();
-            let (multiple, change) = (*simulated.get(&probe)?)?;
+            let &(multiple, change) = simulated.get(&candidate.probe())?;
             candidate.score += change;
             if candidate.hypothesis.is_constant() {
-                candidate.hypothesis.parts[0] = candidate.hypothesis.parts[0].times(multiple, self.atlas());
+                candidate.hypothesis.parts[0] = candidate.hypothesis.parts[0].times(multiple, atlas);
             }
             Some(candidate)
         };

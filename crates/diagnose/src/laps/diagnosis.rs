@@ -206,6 +206,15 @@ fn explain(search: &Search<'_>, mut found: Vec<Found>) -> Vec<Found> {
     }
     found.extend(search.patterns(worth_a_pattern(&found)));
     sort(&mut found);
+    // What changes in the course of the runs may settle, and then needs no other effect.
+    if first_is(&found, |best| {
+        best.settings().iter().any(Setting::goes_by_time) && stands_alone(best)
+    }) {
+        found = held_still(search, found);
+        if first_is(&found, |best| best.has_no_name() && stands_alone(best)) {
+            return found;
+        }
+    }
     let leaves_next_to_nothing = |best: &Explanation| {
         best.share >= ENOUGH && !goes_over_runs_or_time(best) && !hides_what_is_left(best)
     };

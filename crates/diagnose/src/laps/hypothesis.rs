@@ -137,9 +137,14 @@ impl Hypothesis {
     }
 
     /// The same without each of its effects that may do nothing, and with one size of each whose sizes may be the same always.
-    pub(super) fn simpler(&self, errors: &[(Freedom, f64)], atlas: &Atlas) -> Vec<Self> {
+    pub(super) fn simpler(
+        &self,
+        errors: &[(Freedom, f64)],
+        correlation: &DMatrix<f64>,
+        atlas: &Atlas,
+    ) -> Vec<Self> {
         let idle = self
-            .idle(errors, atlas)
+            .idle(errors, correlation, atlas)
             .into_iter()
             .map(|part| self.without(part));
         let steady = (0..self.parts.len()).filter(|&part| !self.pattern_shows(part, errors));
@@ -163,18 +168,28 @@ impl Hypothesis {
         self.parts.len() == other.parts.len() && other.parts.iter().all(has)
     }
 
-    /// Its constant effects whose sizes are so few errors from doing nothing that they may do it.
-    fn idle(&self, errors: &[(Freedom, f64)], atlas: &Atlas) -> Vec<usize> {
+    /// Its constant effects whose sizes are so few errors from doing nothing that they may do it where they are: at another place, or
+    /// over another length, a size may be anything.
+    fn idle(&self, errors: &[(Freedom, f64)], correlation: &DMatrix<f64>, atlas: &Atlas) -> Vec<usize> {
         const ERRORS: f64 = 6.0;
+        let is_place = |freedom: &Freedom| {
+            let is_size = |i: usize| atlas.probes[self.parts[freedom.part].probe].is_size(i);
+            freedom.parameter.is_some_and(|i| !is_size(i))
+        };
+        let fitted_at_place = errors_where(errors, correlation, |freedom, place| {
+            freedom.part == place.part && is_place(place)
+        });
         let is_idle = |&number: &usize| {
             let part = &self.parts[number];
             let probe = &atlas.probes[part.probe];
             let is_near_nothing =
                 |i: usize, error: f64| (part.values[0][i] - probe.origin()[i]).abs() < ERRORS * error;
-            let mut fitted = (errors.iter().filter(|(freedom, _)| freedom.part == number))
-                .filter_map(|(freedom, error)| Some((freedom.parameter?, *error)))
-                .filter(|(i, _)| probe.is_size(*i))
-                .peekable();
+            let mut fitted = (fitted_at_place
+                .iter()
+                .filter(|(freedom, _)| freedom.part == number))
+            .filter_map(|(freedom, error)| Some((freedom.parameter?, *error)))
+            .filter(|(i, _)| probe.is_size(*i))
+            .peekable();
             part.shape == Shape::Constant
                 && match part.held {
                     Some(error) => is_near_nothing(probe.size_index(), error),
@@ -404,6 +419,30 @@ fn differ(values: &[(f64, f64)]) -> Quadratic {
     Quadratic::new(values.iter().map(square).sum(), values.len().saturating_sub(1))
 }
 
+/// The errors of numbers where others stay that hold them, by how all go together.
+fn errors_where(
+    errors: &[(Freedom, f64)],
+    correlation: &DMatrix<f64>,
+    holds: impl Fn(&Freedom, &Freedom) -> bool,
+) -> Vec<(Freedom, f64)> {
+    let of = |i: usize| {
+        let (freedom, error) = errors[i];
+        let held: Vec<usize> = (0..errors.len())
+            .filter(|&j| j != i && holds(&freedom, &errors[j].0))
+            .collect();
+        if held.is_empty() {
+            return (freedom, error);
+        }
+        let to_held = DVector::from_fn(held.len(), |k, _| correlation[(i, held[k])]);
+        let among_held = correlation.select_rows(&held).select_columns(&held);
+        let told = among_held
+            .cholesky()
+            .map(|held| to_held.dot(&held.solve(&to_held)));
+        (freedom, error * (1.0 - told.unwrap_or(0.0)).max(0.0).sqrt())
+    };
+    (0..errors.len()).map(of).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -422,6 +461,26 @@ mod tests {
             assert!((share - mean_over(error, &ten)).abs() < 0.02, "{error}: {share}");
         }
         assert_eq!(share_left(20.0, None, 10.0), 1.0);
+    }
+
+    #[test]
+    fn a_number_is_known_better_where_what_makes_up_for_it_stays() {
+        let correlation = DMatrix::from_row_slice(3, 3, &[1.0, 0.8, 0.0, 0.8, 1.0, 0.0, 0.0, 0.0, 1.0]);
+        let freedom = |part: usize| Freedom {
+            part,
+            run: None,
+            parameter: Some(0),
+            step: 1.0,
+            quantum: None,
+        };
+        let errors = [(freedom(0), 5.0), (freedom(1), 1.0), (freedom(2), 1.0)];
+        // Of its variance 1 - .8^2 is left.
+        let known = errors_where(&errors, &correlation, |own, other| {
+            own.part == 0 && other.part > 0
+        });
+        let known: Vec<f64> = known.into_iter().map(|(_, error)| error).collect();
+        assert!((known[0] - 3.0).abs() < 1e-12);
+        assert_eq!(known[1..], [1.0, 1.0]);
     }
 
     #[test]

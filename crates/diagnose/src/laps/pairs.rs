@@ -12,6 +12,7 @@ use super::refine::Descent;
 use super::rounds::{ERRORS, ROUNDS_OF_SEVERAL, Rung, best_of, is_slow};
 use super::search::{BASES, Found, NEARLY_ALL, STRONG, Search, of_other_effects};
 use super::together::ScreenedPair;
+use super::verdict::WORTH;
 
 /// Hypotheses of several effects that were descended from, and where that led.
 pub(super) struct Tried {
@@ -94,12 +95,17 @@ impl Search<'_> {
             }
             scanned = true;
         }
-        let mut tried = Tried::new(&ROUNDS_OF_SEVERAL, f64::NEG_INFINITY);
         let mut hunts = if scanned {
             self.promising_hunts()
         } else {
             Vec::new()
         };
+        if let Some(best) = singles.first().filter(|best| best.explanation.fits())
+            && !self.may_be_worth_it(best, &hunts)
+        {
+            return Vec::new();
+        }
+        let mut tried = Tried::new(&ROUNDS_OF_SEVERAL, f64::NEG_INFINITY);
         let beats_others = |left: f64| self.together().first().is_none_or(|best| left < best.left);
         let jumps_first = hunts.first().is_some_and(|hunt| beats_others(hunt.left));
         if jumps_first {
@@ -131,6 +137,17 @@ impl Search<'_> {
             self.descend_on_jumping(&mut tried, self.pairs_that_jump(&hunts));
         }
         self.with_exchanged(tried)
+    }
+
+    /// Whether a pair may gain what its numbers must beside a single effect that leaves nothing significant, as far as paths and hunts
+    /// tell.
+    fn may_be_worth_it(&self, single: &Found, hunts: &[Hunt]) -> bool {
+        let least = single.explanation.score + WORTH;
+        let hunted = hunts
+            .first()
+            .map(|hunt| 0.5 * (self.residual.norm_squared() - hunt.left));
+        hunted.is_some_and(|gain| gain > least)
+            || self.together().first().is_some_and(|best| best.score > least)
     }
 
     /// Pairs with a size that jumps, if these promise more than those that are looked for together: they promise rather more than they
@@ -182,6 +199,12 @@ impl Search<'_> {
             self.tell(format_args!("which two effects go together"));
             self.heard_pairs(self.atlas().screen_pairs(self.residual, HEARD))
         })
+    }
+
+    /// Whether pairs that are looked for together promise more than the best of what was tried.
+    pub(super) fn together_promise_more_than(&self, tried: &Tried) -> bool {
+        let best = best_of(&tried.descents).map_or(tried.reached, |best| best.score);
+        self.together().first().is_some_and(|first| first.score > best)
     }
 
     /// Whether the best leaves so little of a strong signal, and not far too much for chance, that an effect that jumps does not stand for

@@ -66,9 +66,6 @@ pub(super) const CLOSE_SETS: u64 = 64;
 /// Errors by which a number may have moved that then is where it should be.
 pub(super) const SETTLED: f64 = 0.7;
 
-/// Errors by which numbers may still be off where they are left as they are.
-const AT_REST: f64 = 0.25;
-
 /// A hypothesis at its most likely sizes.
 #[derive(Debug, Clone)]
 pub(super) struct Refined {
@@ -110,6 +107,8 @@ pub(super) struct Descent {
     rises: Rises,
     /// Where it was last looked around in a full round.
     seen: Option<Seen>,
+    /// What this round told of its parts beside other effects.
+    given: BTreeMap<usize, Arc<Slopes>>,
     /// How often it was looked around.
     looks: u32,
     /// Whether the moves stayed within the steps of the last look.
@@ -193,6 +192,7 @@ impl Descent {
             near: None,
             rises: Rises::default(),
             seen: None,
+            given: BTreeMap::new(),
             looks: 0,
             holds: false,
             rests: freedoms.is_empty(),
@@ -267,21 +267,48 @@ impl Descent {
         self.holds && clear && !self.leaves_far_too_much()
     }
 
-    /// The slopes of those of its parts that are known from elsewhere, until it looks around itself.
+    /// The slopes of those of its parts that are known from elsewhere: what this round told, or until it looks around itself an earlier
+    /// one.
     fn known_slopes(&self, atlas: &Atlas) -> BTreeMap<usize, SeenSlopes> {
-        if self.looks > 0 || self.hypothesis.parts.len() < 2 {
+        if self.hypothesis.parts.len() < 2 {
             return BTreeMap::new();
         }
-        let known = |(i, part): (usize, &Part)| Some((i, part.slopes.as_ref()?.seen_from(part, atlas)?));
+        let known = |(i, part): (usize, &Part)| {
+            let slopes = (self.given.get(&i)).or_else(|| self.slopes_from_elsewhere(part, atlas))?;
+            Some((i, slopes.seen_from(part, atlas)?))
+        };
         let parts = self.hypothesis.parts.iter().enumerate();
         parts.filter_map(known).collect()
     }
 
-    /// Has each of its parts that have a place know what a look around told of it.
-    fn keep_slopes(&mut self, local: &Local, atlas: &Atlas) {
-        for part in self.hypothesis.places(atlas).collect::<Vec<_>>() {
-            let slopes = Slopes::of(part, &self.hypothesis, &self.freedoms, local);
-            self.hypothesis.parts[part].slopes = Some(Arc::new(slopes));
+    /// What was told of a part with a place elsewhere, until it looks around itself.
+    fn slopes_from_elsewhere<'p>(&self, part: &'p Part, atlas: &Atlas) -> Option<&'p Arc<Slopes>> {
+        let slopes = part.slopes.as_ref().filter(|slopes| !slopes.rough);
+        slopes.filter(|_| self.looks == 0 && atlas.probes[part.probe].has_place())
+    }
+
+    /// Has it know what a look around another descent told of the effects that they share, but for places that are known to it from
+    /// elsewhere.
+    pub(super) fn take_slopes_of(&mut self, other: &Self, atlas: &Atlas) {
+        for (i, part) in self.hypothesis.parts.iter().enumerate() {
+            let same = (other.hypothesis.parts.iter()).find(|other| other.probe == part.probe);
+            if let Some(slopes) = same.and_then(|same| same.slopes.as_ref())
+                && self.slopes_from_elsewhere(part, atlas).is_none()
+            {
+                self.given.insert(i, Arc::clone(slopes));
+            }
+        }
+    }
+
+    /// Has each of its parts know what a look around told of it.
+    fn keep_slopes(&mut self, local: &Local, round: Round, atlas: &Atlas) {
+        let rough = round == Round::Rough;
+        for i in 0..self.hypothesis.parts.len() {
+            let is_known = (self.slopes_from_elsewhere(&self.hypothesis.parts[i], atlas)).is_some();
+            if !(rough && is_known) {
+                let slopes = Slopes::of(i, &self.hypothesis, &self.freedoms, local, rough);
+                self.hypothesis.parts[i].slopes = Some(Arc::new(slopes));
+            }
         }
     }
 
@@ -367,12 +394,17 @@ impl Trial<'_> {
         let full = round == Round::Full;
         let known = descent.known_slopes(self.atlas);
         let is_new = |freedom: &&Freedom| !known.contains_key(&freedom.part);
-        let points = 2 * descent.freedoms.iter().filter(is_new).count() as u64 + 1;
-        let sets = self.atlas.enough(round.sets_around(points), points);
+        let points_in = |numbers: usize| 2 * numbers as u64 + 1;
+        let points = points_in(descent.freedoms.iter().filter(is_new).count());
+        // What is known of the others was told by as many data sets as all take.
+        let of_all = if full {
+            points_in(descent.freedoms.len())
+        } else {
+            points
+        };
+        let sets = self.atlas.enough(round.sets_around(of_all), points);
         let mut local = self.local_knowing(&known, &descent.hypothesis, &descent.freedoms, sets)?;
-        if round != Round::Rough {
-            descent.keep_slopes(&local, self.atlas);
-        }
+        descent.keep_slopes(&local, round, self.atlas);
         let Descent {
             hypothesis, freedoms, ..
         } = &descent;
@@ -423,10 +455,14 @@ impl Trial<'_> {
         let correlation = nearest.correlation();
         let Nearest { moves, errors, .. } = nearest;
         // A place that is known was looked around elsewhere.
-        let knows_place =
-            !known.is_empty() && (hypothesis.places(self.atlas)).all(|part| known.contains_key(&part));
-        let hypothesis = self.atlas.with_moves(&hypothesis, &freedoms, &moves);
+        let is_known = |part: usize| known.get(&part).is_some_and(|slopes| !slopes.are_rough());
+        let knows_place = !known.is_empty() && hypothesis.places(self.atlas).all(is_known);
         let found = full && is_settled(&moves, &nearest.covariance, &freedoms);
+        let (hypothesis, moves) = if found && are_at_rest(&moves, &errors) {
+            (hypothesis, DVector::zeros(moves.len()))
+        } else {
+            (self.atlas.with_moves(&hypothesis, &freedoms, &moves), moves)
+        };
         let holds = are_within_steps(&moves, &freedoms);
         let remainder = full.then(|| Departures::new(&nearest.fit.residual, &self.atlas.layout));
         for (i, freedom) in freedoms.iter_mut().enumerate() {
@@ -443,6 +479,7 @@ impl Trial<'_> {
             near: Some((local, moves)),
             rises: Rises::default(),
             seen: here,
+            given: BTreeMap::new(),
             looks: looks + 1 + u32::from(knows_place),
             holds,
             rests: false,
@@ -479,9 +516,7 @@ impl Trial<'_> {
         } = nearest;
         let found = full && is_settled(&moves, &nearest.covariance, &freedoms);
         let remainder = Some(Departures::new(&nearest.fit.residual, &self.atlas.layout));
-        let at_rest =
-            found && (moves.iter().zip(&errors)).all(|(moved, error)| moved.abs() < AT_REST * error);
-        let (hypothesis, moved) = if at_rest {
+        let (hypothesis, moved) = if found && are_at_rest(&moves, &errors) {
             (descent.hypothesis.clone(), moved)
         } else {
             let hypothesis = self.atlas.with_moves(&descent.hypothesis, &freedoms, &moves);
@@ -497,6 +532,7 @@ impl Trial<'_> {
             near: Some((local, moved)),
             rises: Rises::default(),
             seen: None,
+            given: BTreeMap::new(),
             looks,
             rests: false,
             found,
@@ -653,6 +689,7 @@ impl Atlas {
             near: None,
             rises: to.rises,
             seen: None,
+            given: BTreeMap::new(),
             looks: descent.looks + 1,
             holds: false,
             // With so few data sets a top may be anywhere.
@@ -772,6 +809,12 @@ pub(super) fn are_within_steps(moves: &DVector<f64>, freedoms: &[Freedom]) -> bo
     (moves.iter().zip(freedoms)).all(|(moved, freedom)| moved.abs() < freedom.step)
 }
 
+/// Whether numbers are off by so little that they are left as they are: by an eighth of a unit each.
+fn are_at_rest(moves: &DVector<f64>, errors: &[f64]) -> bool {
+    const AT_REST: f64 = 0.5;
+    (moves.iter().zip(errors)).all(|(moved, error)| moved.abs() < AT_REST * error)
+}
+
 /// Whether numbers moved so little that there is nowhere left to go.
 fn is_settled(moves: &DVector<f64>, covariance: &DMatrix<f64>, freedoms: &[Freedom]) -> bool {
     /// Errors by which a number may still have moved if the points of its parabola lie so many times farther out.
@@ -784,11 +827,15 @@ fn is_settled(moves: &DVector<f64>, covariance: &DMatrix<f64>, freedoms: &[Freed
 
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeSet;
+    use std::sync::Mutex;
+
     use sim::Setting;
 
     use super::*;
     use crate::laps::atlas::Extent;
-    use crate::laps::testing::{aside, atlas, simulated};
+    use crate::laps::probe::Probe;
+    use crate::laps::testing::{aside, atlas, atlas_of, simulated};
 
     #[test]
     fn a_last_move_that_promised_more_than_it_kept_is_taken_back() {
@@ -863,6 +910,41 @@ mod tests {
             descent.near = Some((local, DVector::zeros(1)));
             assert_eq!(descent.knows_its_slopes(&atlas), knows, "{sets}");
         }
+    }
+
+    #[test]
+    fn what_a_place_does_is_looked_at_once_for_all_that_share_it() {
+        let atlas = atlas_of(&["reflectance-patch", "wheel-scale", "axle-length"]);
+        let runs = simulated(&aside(1.3), 1000, Extent::Whole).unwrap();
+        let data = atlas.observed(&runs).unwrap();
+        let part = |effect: &str| {
+            let is_it = |probe: &Probe| probe.spec.name == effect;
+            let probe = atlas.probes.iter().position(is_it).unwrap();
+            Part::screened(&atlas, probe, Shape::Constant, &[1.2])
+        };
+        let beside = |effect: &str| Hypothesis {
+            parts: vec![part("reflectance-patch"), part(effect)],
+        };
+        let asked = Mutex::new(BTreeSet::new());
+        let counting = |effects: &[Setting], set: u64, extent: Extent| {
+            asked.lock().unwrap().insert(format!("{effects:?}"));
+            simulated(effects, set, extent)
+        };
+        let trial = Trial::new(&atlas, &counting, &data);
+        let points = |descent: Descent| {
+            asked.lock().unwrap().clear();
+            let after = trial.descend(descent, Round::Rough).unwrap();
+            (after, asked.lock().unwrap().len())
+        };
+        // A patch has a factor, a place and a length.
+        let (first, all) = points(Descent::start(&atlas, &beside("wheel-scale")));
+        assert_eq!(all, 1 + 2 * 4);
+        let mut other = Descent::start(&atlas, &beside("axle-length"));
+        other.take_slopes_of(&first, &atlas);
+        let (other, own) = points(other);
+        assert_eq!(own, 1 + 2);
+        // A first look does not find a place: it is looked around again.
+        assert_eq!(other.looks, 1);
     }
 
     #[test]

@@ -1,5 +1,7 @@
 //! Descents to the most likely sizes of many hypotheses, of which fewer are left after every round.
 
+use std::collections::BTreeSet;
+
 use rayon::prelude::*;
 
 use super::hunt::Moved;
@@ -133,9 +135,7 @@ impl Search<'_> {
                 without_also_rans(&mut alive, FEW);
             }
             self.tell(format_args!("{}", self.in_words(&alive)));
-            alive = (alive.into_par_iter())
-                .filter_map(|descent| self.trial.descend(descent, round))
-                .collect();
+            alive = self.round(alive, round);
             self.trial.judge_together(&mut alive);
             alive.sort_by(|a, b| b.score.total_cmp(&a.score));
             let Some(first) = alive.first() else {
@@ -160,6 +160,32 @@ impl Search<'_> {
             }
         }
         alive
+    }
+
+    /// A round of every descent. The first with an effect goes before others with the same, which take from it what a look around told
+    /// of that.
+    fn round(&self, descents: Vec<Descent>, round: Round) -> Vec<Descent> {
+        let all = |descents: Vec<Descent>| {
+            (descents.into_par_iter()).filter_map(|descent| self.trial.descend(descent, round))
+        };
+        let mut known: BTreeSet<usize> = BTreeSet::new();
+        let shares_an_effect = |Descent { hypothesis, .. }: &Descent| {
+            let several = hypothesis.parts.len() > 1;
+            let shares = several && hypothesis.parts.iter().any(|part| known.contains(&part.probe));
+            if !shares {
+                known.extend(hypothesis.parts.iter().map(|part| part.probe));
+            }
+            shares
+        };
+        let (mut others, first): (Vec<Descent>, Vec<Descent>) =
+            descents.into_iter().partition(shares_an_effect);
+        let mut done: Vec<Descent> = all(first).collect();
+        for other in &mut others {
+            done.iter()
+                .for_each(|first| other.take_slopes_of(first, self.atlas()));
+        }
+        done.par_extend(all(others));
+        done
     }
 
     /// The effects that are descended from, a few by name.
@@ -206,9 +232,9 @@ impl Search<'_> {
         self.settle_hunted(&self.hunted_again(descents, Moved::Little))
     }
 
-    /// The same of what may be listed but hardly claimed: rivals are not told apart any closer.
+    /// The same of what may be listed but hardly claimed: sizes that jump get one closer look, and rivals are not told apart any closer.
     pub(super) fn settle_roughly(&self, descents: Vec<Descent>) -> Vec<Found> {
-        self.sorted(&self.ends(&self.hunted_again(descents, Moved::Far)))
+        self.sorted(&self.ends(&self.best_hunted(descents, Moved::Little, 1)))
     }
 
     fn settle_hunted(&self, descents: &[Descent]) -> Vec<Found> {
@@ -239,14 +265,20 @@ impl Search<'_> {
     }
 
     /// Descents with better sizes of the effects that jump, which were found beside others that have moved since: those of the best
-    /// descent, for those that are near it, until they come to rest or no longer matter; and those of rivals, for themselves.
-    fn hunted_again(&self, mut descents: Vec<Descent>, at_first: Moved) -> Vec<Descent> {
+    /// descent, for those that are near it, and those of rivals, for themselves.
+    fn hunted_again(&self, descents: Vec<Descent>, at_first: Moved) -> Vec<Descent> {
+        self.with_rivals_hunted(self.best_hunted(descents, at_first, 2 * LOOKS))
+    }
+
+    /// Descents with the sizes of what jumps that are better for the best descent where they are near it, until they come to rest or no
+    /// longer matter, after so many looks at most.
+    fn best_hunted(&self, mut descents: Vec<Descent>, at_first: Moved, looks: usize) -> Vec<Descent> {
         /// Share of the best score by which a descent may lie behind it and still follow at the first look, log-likelihood by which it
         /// may later, and how many do.
         const SHARE: f64 = 0.03;
         const CLOSE: f64 = 15.0;
         const MOST: [usize; 2] = [4, 2];
-        for look in 0..2 * LOOKS {
+        for look in 0..looks {
             let Some(best) = best_of(&descents) else {
                 break;
             };
@@ -299,7 +331,7 @@ impl Search<'_> {
                 break;
             }
         }
-        self.with_rivals_hunted(descents)
+        descents
     }
 
     /// Descents of which those that are near the best have better sizes of their own of the effects that jump; where the best leaves
@@ -342,7 +374,7 @@ impl Search<'_> {
     /// Simulates the best hypothesis more often, and still more if others explain nearly as much; not if it leaves far too much, or
     /// surely something and is not to be claimed.
     fn closer(&self, settled: Vec<Settled>) -> Vec<Settled> {
-        const CLOSE_SETS_OF_ALL: u64 = 240;
+        const CLOSE_SETS_OF_ALL: u64 = 160;
         /// Laps of a data set of which that many are simulated; of smaller ones more, in the same time.
         const USUAL_LAPS: u64 = 80;
         let score = |s: &&Settled| s.refined.score;

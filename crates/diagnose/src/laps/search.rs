@@ -147,7 +147,7 @@ impl Search<'_> {
     pub(super) fn simpler<'f>(&self, best: impl Iterator<Item = &'f Found>) -> Vec<Found> {
         let mut starts: Vec<Hypothesis> = Vec::new();
         for found in best {
-            for start in found.hypothesis.simpler(&found.errors, self.atlas()) {
+            for start in (found.hypothesis).simpler(&found.errors, &found.correlation, self.atlas()) {
                 if !starts.iter().any(|other| other.has_patterns_of(&start)) {
                     starts.push(start);
                 }

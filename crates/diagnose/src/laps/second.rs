@@ -22,9 +22,10 @@ impl Search<'_> {
     /// The best pairs of a single effect that explains nearly all, the first of those found, tried to the end: those with what explains
     /// best what it leaves. A size that jumps is looked for more closely first, and is then the first of those found.
     pub(super) fn pairs_with_first(&self, found: &mut Vec<Found>) -> Vec<Found> {
-        let Some(single) = found.first() else {
+        let Some(single) = found.first().cloned() else {
             return Vec::new();
         };
+        let single = &single;
         let reached = single.explanation.score + fair_share_of_faults(single);
         let mut tried = Tried::new(&ROUNDS_BESIDE, reached);
         let jumps = self.jumps(&single.hypothesis);
@@ -47,7 +48,7 @@ impl Search<'_> {
                 }
                 Promise::Enough(pairs) => {
                     if let Some(closer) = self.with_closer_sizes(single) {
-                        found.insert(0, closer);
+                        found[0] = closer;
                         return self.pairs_with_first(found);
                     }
                     promises = true;
@@ -55,8 +56,11 @@ impl Search<'_> {
                     if stands_alone(&single.explanation) {
                         // What is not worth its numbers lacks no other name.
                         let ends = self.settle_roughly(tried.descents().to_vec());
-                        let is_worth_it =
-                            |pair: &Found| is_worth_its_numbers(&single.explanation, &pair.explanation);
+                        if let Some(closer) = self.at_sizes_of_best(single, &ends) {
+                            found[0] = closer;
+                        }
+                        let alone = &found[0].explanation;
+                        let is_worth_it = |pair: &Found| is_worth_its_numbers(alone, &pair.explanation);
                         if !ends.iter().any(is_worth_it) {
                             return ends;
                         }
@@ -68,13 +72,19 @@ impl Search<'_> {
                 }
             }
         }
+        // Two effects that have nothing of the single one may do together what it does nearly, and come first where they promise more
+        // than what was tried.
+        let may_be_others = self.lacks_more_than_faults(single);
+        let others_first = may_be_others && !tried.fits() && self.together_promise_more_than(&tried);
+        if others_first {
+            self.try_together(&mut tried, found);
+        }
         // A further effect may do more beside another single one than what the first is ahead.
         if self.is_strong() && !single.explanation.fits() && !jumps && !tried.fits() {
             let beside = self.beside_next(found, tried.starts());
             self.descend_on(&mut tried, beside);
         }
-        // Two effects that have nothing of the single one may do together what it does nearly.
-        if self.lacks_more_than_faults(single) && !tried.fits() {
+        if may_be_others && !others_first && !tried.fits() {
             self.try_together(&mut tried, found);
         }
         if promises && !jumps && surely_lacks && !tried.fits() {
@@ -168,6 +178,16 @@ impl Search<'_> {
         let hunted = self.trial.hunt_again(&found.hypothesis, Moved::Little)?;
         let closer = self.settled(&hunted)?;
         (closer.explanation.score > found.explanation.score + BETTER).then_some(closer)
+    }
+
+    /// An explanation at the sizes that jump of the best of others with more effects, if these are better without those too.
+    fn at_sizes_of_best(&self, found: &Found, others: &[Found]) -> Option<Found> {
+        let there = found.hypothesis.with_held(&others.first()?.hypothesis.parts);
+        if there == found.hypothesis {
+            return None;
+        }
+        let closer = self.settled(&there)?;
+        (closer.explanation.score > found.explanation.score).then_some(closer)
     }
 }
 

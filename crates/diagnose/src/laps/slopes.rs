@@ -18,11 +18,19 @@ pub(super) struct Slopes {
     columns: Vec<Column>,
     /// In units of which the columns are.
     scatter: Vec<Scatter>,
+    /// Whether it was looked around for the first time, which does not find a place.
+    pub(super) rough: bool,
 }
 
 impl Slopes {
     /// Those of a part of a hypothesis that was looked around in some numbers.
-    pub(super) fn of(part: usize, hypothesis: &Hypothesis, freedoms: &[Freedom], local: &Local) -> Self {
+    pub(super) fn of(
+        part: usize,
+        hypothesis: &Hypothesis,
+        freedoms: &[Freedom],
+        local: &Local,
+        rough: bool,
+    ) -> Self {
         let numbers = freedoms.iter().zip(&local.columns);
         let (freedoms, columns) = numbers
             .filter(|(freedom, _)| freedom.part == part)
@@ -33,6 +41,7 @@ impl Slopes {
             freedoms,
             columns,
             scatter: local.scatter.clone(),
+            rough,
         }
     }
 
@@ -41,7 +50,7 @@ impl Slopes {
         /// Steps of the look that they reach.
         const STEPS: f64 = 2.0;
         let at = &self.at.parts[0];
-        if (at.probe, at.shape) != (part.probe, part.shape) {
+        if (at.probe, at.shape, &at.tied) != (part.probe, part.shape, &part.tied) {
             return None;
         }
         let there = Hypothesis::of(part.clone().without_slopes());
@@ -66,6 +75,11 @@ pub(super) struct SeenSlopes {
 }
 
 impl SeenSlopes {
+    /// Whether they are those of a first look.
+    pub(super) fn are_rough(&self) -> bool {
+        self.of.rough
+    }
+
     /// What each number does, in units of a scatter.
     pub(super) fn in_units_of(&self, scatter: &[Scatter], layout: &Layout) -> Vec<Column> {
         let other = |column: &Column| column.in_other_units(layout, &self.of.scatter, scatter);
@@ -113,7 +127,7 @@ mod tests {
             .unwrap();
         let trial = Trial::new(&atlas, &bent, &data);
         let local = trial.local(&patch, &freedoms, SETS).unwrap();
-        let slopes = Arc::new(Slopes::of(0, &patch, &freedoms, &local));
+        let slopes = Arc::new(Slopes::of(0, &patch, &freedoms, &local, false));
 
         let by = |steps: f64| patch.moved(&atlas, &[(freedoms[0], steps * freedoms[0].step)]);
         let near = by(1.5);

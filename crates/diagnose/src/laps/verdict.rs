@@ -30,7 +30,7 @@ const CLEAR_P: f64 = 0.01;
 /// A share that is less by so much is as good.
 const AS_GOOD: f64 = 0.01;
 /// Log-likelihood that each number of a further effect must gain.
-const WORTH: f64 = 10.0;
+pub(super) const WORTH: f64 = 10.0;
 /// The same where what comes before stands without it.
 const WORTH_BESIDE: f64 = 15.0;
 /// Share that one effect must explain for what is left to be a fault of the model rather than a cause without a name.

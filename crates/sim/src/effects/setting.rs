@@ -71,6 +71,11 @@ impl Setting {
         matches!(self.pattern, Pattern::ByRun(_))
     }
 
+    /// Whether its size changes in the course of each run.
+    pub fn goes_by_time(&self) -> bool {
+        matches!(self.pattern, Pattern::ByTime { .. })
+    }
+
     /// An effect with the same values always.
     pub fn constant(spec: &'static Spec, values: impl Into<Vec<f64>>) -> Self {
         Self {
