@@ -287,10 +287,11 @@ impl Descent {
         slopes.filter(|_| self.looks == 0 && atlas.probes[part.probe].has_place())
     }
 
-    /// Has it know what a look around another descent told of the effects that they share, but for places that are known to it from
-    /// elsewhere.
+    /// Has it know what a look around another descent told of the constant effects that they share, but for places that are known to it
+    /// from elsewhere.
     pub(super) fn take_slopes_of(&mut self, other: &Self, atlas: &Atlas) {
-        for (i, part) in self.hypothesis.parts.iter().enumerate() {
+        let parts = self.hypothesis.parts.iter().enumerate();
+        for (i, part) in parts.filter(|(_, part)| part.shape == Shape::Constant) {
             let same = (other.hypothesis.parts.iter()).find(|other| other.probe == part.probe);
             if let Some(slopes) = same.and_then(|same| same.slopes.as_ref())
                 && self.slopes_from_elsewhere(part, atlas).is_none()
@@ -396,13 +397,9 @@ impl Trial<'_> {
         let is_new = |freedom: &&Freedom| !known.contains_key(&freedom.part);
         let points_in = |numbers: usize| 2 * numbers as u64 + 1;
         let points = points_in(descent.freedoms.iter().filter(is_new).count());
-        // What is known of the others was told by as many data sets as all take.
-        let of_all = if full {
-            points_in(descent.freedoms.len())
-        } else {
-            points
-        };
-        let sets = self.atlas.enough(round.sets_around(of_all), points);
+        // What is known of others was told by as many data sets as all take, and candidates are compared by the same draws.
+        let sets = round.sets_around(points_in(descent.freedoms.len()));
+        let sets = self.atlas.enough(sets, points);
         let mut local = self.local_knowing(&known, &descent.hypothesis, &descent.freedoms, sets)?;
         descent.keep_slopes(&local, round, self.atlas);
         let Descent {
@@ -913,7 +910,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_place_does_is_looked_at_once_for_all_that_share_it() {
+    fn what_an_effect_does_is_looked_at_once_for_all_that_share_it() {
         let atlas = atlas_of(&["reflectance-patch", "wheel-scale", "axle-length"]);
         let runs = simulated(&aside(1.3), 1000, Extent::Whole).unwrap();
         let data = atlas.observed(&runs).unwrap();
