@@ -287,11 +287,11 @@ impl Descent {
         slopes.filter(|_| self.looks == 0 && atlas.probes[part.probe].has_place())
     }
 
-    /// Has it know what a look around another descent told of the constant effects that they share, but for places that are known to it
-    /// from elsewhere.
-    pub(super) fn take_slopes_of(&mut self, other: &Self, atlas: &Atlas) {
+    /// Has it know what a look around another descent told of those constant effects that are `shared`, but for places that are known
+    /// to it from elsewhere.
+    pub(super) fn take_slopes_of(&mut self, other: &Self, shared: impl Fn(&Part) -> bool, atlas: &Atlas) {
         let parts = self.hypothesis.parts.iter().enumerate();
-        for (i, part) in parts.filter(|(_, part)| part.shape == Shape::Constant) {
+        for (i, part) in parts.filter(|(_, part)| part.shape == Shape::Constant && shared(part)) {
             let same = (other.hypothesis.parts.iter()).find(|other| other.probe == part.probe);
             if let Some(slopes) = same.and_then(|same| same.slopes.as_ref())
                 && self.slopes_from_elsewhere(part, atlas).is_none()
@@ -937,7 +937,7 @@ mod tests {
         let (first, all) = points(Descent::start(&atlas, &beside("wheel-scale")));
         assert_eq!(all, 1 + 2 * 4);
         let mut other = Descent::start(&atlas, &beside("axle-length"));
-        other.take_slopes_of(&first, &atlas);
+        other.take_slopes_of(&first, |_| true, &atlas);
         let (other, own) = points(other);
         assert_eq!(own, 1 + 2);
         // A first look does not find a place: it is looked around again.

@@ -8,7 +8,7 @@ use super::hunt::Moved;
 use super::hypothesis::Hypothesis;
 use super::part::Part;
 use super::refine::{CLOSE_SETS, Descent, Round, Settled};
-use super::search::{Found, Search, sort};
+use super::search::{Found, STRONG, Search, sort};
 use super::simulated::FINAL_SETS;
 use super::verdict::is_no_answer;
 
@@ -163,17 +163,22 @@ impl Search<'_> {
     }
 
     /// A round of every descent. The first with an effect goes before others with the same, which take from it what a look around told
-    /// of that.
+    /// of that; of strong signals places alone, as slopes that are a little off leave the more the more an effect does.
     fn round(&self, descents: Vec<Descent>, round: Round) -> Vec<Descent> {
+        /// Signal up to which other effects are shared too.
+        const FAINT: f64 = 5.0 * STRONG;
+        let is_faint = self.signal() < FAINT;
+        let is_shared = |part: &Part| is_faint || self.atlas().probes[part.probe].has_place();
         let all = |descents: Vec<Descent>| {
             (descents.into_par_iter()).filter_map(|descent| self.trial.descend(descent, round))
         };
         let mut known: BTreeSet<usize> = BTreeSet::new();
         let shares_an_effect = |Descent { hypothesis, .. }: &Descent| {
             let several = hypothesis.parts.len() > 1;
-            let shares = several && hypothesis.parts.iter().any(|part| known.contains(&part.probe));
+            let shared = || hypothesis.parts.iter().filter(|part| is_shared(part));
+            let shares = several && shared().any(|part| known.contains(&part.probe));
             if !shares {
-                known.extend(hypothesis.parts.iter().map(|part| part.probe));
+                known.extend(shared().map(|part| part.probe));
             }
             shares
         };
@@ -182,7 +187,7 @@ impl Search<'_> {
         let mut done: Vec<Descent> = all(first).collect();
         for other in &mut others {
             done.iter()
-                .for_each(|first| other.take_slopes_of(first, self.atlas()));
+                .for_each(|first| other.take_slopes_of(first, is_shared, self.atlas()));
         }
         done.par_extend(all(others));
         done
