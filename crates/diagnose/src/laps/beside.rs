@@ -231,7 +231,7 @@ impl Search<'_> {
         const MOST: usize = 5;
         /// Log-likelihood by which what was heard may be behind and turn out as good.
         const NEAR: f64 = 10.0;
-        let gain = 0.5 * (self.residual.norm_squared() - left.norm_squared());
+        let gain = self.gained(left.norm_squared());
         let shortlist = self.shortlist(heard);
         let near = |other: &&&Screened| other.score > shortlist[0].score - NEAR;
         let further = if gain < WEAK {

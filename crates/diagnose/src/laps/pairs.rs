@@ -143,9 +143,7 @@ impl Search<'_> {
     /// tell.
     fn may_be_worth_it(&self, single: &Found, hunts: &[Hunt]) -> bool {
         let least = single.explanation.score + WORTH;
-        let hunted = hunts
-            .first()
-            .map(|hunt| 0.5 * (self.residual.norm_squared() - hunt.left));
+        let hunted = hunts.first().map(|hunt| self.gained(hunt.left));
         hunted.is_some_and(|gain| gain > least)
             || self.together().first().is_some_and(|best| best.score > least)
     }
@@ -358,7 +356,7 @@ impl Search<'_> {
         let step = squares.try_inverse()? * products;
         let sizes = [0, 1].map(|i| pair.sizes[i] + step[i]);
         let deviance = scatter.deviance(&left) - step.dot(&products);
-        let gain = 0.5 * (self.residual.norm_squared() - deviance);
+        let gain = self.gained(deviance);
         Some(atlas.screened_pair(probes, sizes, gain, deviance))
     }
 }

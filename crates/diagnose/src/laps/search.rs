@@ -410,6 +410,11 @@ impl Search<'_> {
         0.5 * self.excess(self.residual)
     }
 
+    /// The log-likelihood gained by what leaves such a deviance of the data.
+    pub(super) fn gained(&self, left: f64) -> f64 {
+        0.5 * (self.residual.norm_squared() - left)
+    }
+
     /// What is left of the data in squared distance beyond what chance leaves.
     pub(super) fn excess(&self, left: &White) -> f64 {
         left.norm_squared() - self.chance()
