@@ -25,6 +25,19 @@ pub(super) struct Base {
     following: Vec<White>,
 }
 
+/// What goes with a hypothesis, as simulations beside it told.
+#[derive(Debug, Clone)]
+pub(super) struct Heard {
+    pub(super) base: Base,
+    /// What it leaves of the data, in units of the declared model's scatter.
+    pub(super) left: White,
+    /// Further effects, best first.
+    pub(super) others: Vec<Screened>,
+}
+
+/// What goes with a single effect, whose numbers have such standard errors.
+pub(super) type HeardBesideSingle = (Heard, Vec<(Freedom, f64)>);
+
 /// In units of which scatter what is left beside a hypothesis has to stand out.
 #[derive(Debug, Clone)]
 enum Units {
@@ -69,6 +82,21 @@ impl Base {
     /// What no change of its numbers explains.
     fn beyond(&self, left: White) -> White {
         without_directions(left, &self.following)
+    }
+}
+
+impl Heard {
+    /// Whether it was told beside an effect where that is, by such errors: beyond what its numbers do the same is left.
+    fn is_beside(&self, effect: &Part, errors: &[(Freedom, f64)], atlas: &Atlas) -> bool {
+        let known = &self.base.hypothesis;
+        let [part] = known.parts.as_slice() else {
+            return false;
+        };
+        let there = Hypothesis::of(effect.clone());
+        let mut numbers = errors.iter();
+        (part.probe, part.shape) == (effect.probe, effect.shape)
+            && effect.is_within_error_of(part)
+            && numbers.all(|(freedom, error)| there.apart(known, freedom, atlas).abs() <= *error)
     }
 }
 
@@ -210,36 +238,37 @@ impl Atlas {
     }
 }
 
+/// Why a lock is not poisoned.
+const NO_PANIC: &str = "no thread panics while it holds the list";
+
 impl Search<'_> {
     /// A base with each of the effects that explain best what it leaves, but for those that were tried and for those that
     /// jump: [`Search::scans_beside`] is for these.
-    pub(super) fn beside(&self, base: &Base, left: &White, tried: &[Hypothesis]) -> Vec<Hypothesis> {
-        let heard = self.heard_beside(base, self.screened_beside(base, left));
-        self.beside_of(&heard, base, left, tried)
+    pub(super) fn beside(&self, base: Base, left: White, tried: &[Hypothesis]) -> Vec<Hypothesis> {
+        self.with_heard(&self.hear(base, left), tried)
     }
 
-    /// The same of what was screened and heard already.
-    pub(super) fn beside_of(
-        &self,
-        heard: &[Screened],
-        base: &Base,
-        left: &White,
-        tried: &[Hypothesis],
-    ) -> Vec<Hypothesis> {
+    fn hear(&self, base: Base, left: White) -> Heard {
+        let others = self.heard_beside(&base, self.screened_beside(&base, &left));
+        Heard { base, left, others }
+    }
+
+    /// The same of what was heard already.
+    pub(super) fn with_heard(&self, heard: &Heard, tried: &[Hypothesis]) -> Vec<Hypothesis> {
         const FURTHER: usize = 3;
         /// The same where more are about as good as the best, or of a weak signal, of which what was heard tells less.
         const MOST: usize = 5;
         /// Log-likelihood by which what was heard may be behind and turn out as good.
         const NEAR: f64 = 10.0;
-        let gain = self.gained(left.norm_squared());
-        let shortlist = self.shortlist(heard);
+        let gain = self.gained(heard.left.norm_squared());
+        let shortlist = self.shortlist(&heard.others);
         let near = |other: &&&Screened| other.score > shortlist[0].score - NEAR;
         let further = if gain < WEAK {
             MOST
         } else {
             shortlist.iter().filter(near).count().clamp(FURTHER, MOST)
         };
-        let start = &base.hypothesis;
+        let start = &heard.base.hypothesis;
         (shortlist.iter())
             .map(|other| (other.score, start.with(&other.hypothesis)))
             // A pattern may cost more than all that a further effect gains.
@@ -362,9 +391,9 @@ impl Search<'_> {
         let mut all = tried.to_vec();
         for found in bases {
             self.tell(format_args!("what is beside {}", found.explanation.label()));
-            let base = self.trial.base(found.hypothesis.clone());
-            let beside = self.beside(&base, &found.left, &all);
-            all.extend(beside);
+            let heard = self.hear(self.trial.base(found.hypothesis.clone()), found.left.clone());
+            all.extend(self.with_heard(&heard, &all));
+            self.remember(heard, found);
         }
         all.split_off(tried.len())
     }
@@ -374,14 +403,30 @@ impl Search<'_> {
     pub(super) fn beside_each(&self, effects: &[Part], tried: &[Hypothesis]) -> Vec<Hypothesis> {
         let mut all = tried.to_vec();
         for effect in effects {
+            if let Some(heard) = self.heard_before(effect) {
+                all.extend(self.with_heard(&heard, &all));
+                continue;
+            }
             let alone = Hypothesis::of(effect.clone());
             if let Some(left) = self.left_by(&alone) {
-                let base = self.trial.base(alone);
-                let others = self.beside(&base, &left, &all);
-                all.extend(others);
+                all.extend(self.beside(self.trial.base(alone), left, &all));
             }
         }
         all.split_off(tried.len())
+    }
+
+    /// Keeps what was heard beside a single effect.
+    pub(super) fn remember(&self, heard: Heard, single: &Found) {
+        let mut known = self.heard.lock().expect(NO_PANIC);
+        known.push((heard, single.errors.clone()));
+    }
+
+    /// What was heard beside an effect already, if that is where it was.
+    fn heard_before(&self, effect: &Part) -> Option<Heard> {
+        let known = self.heard.lock().expect(NO_PANIC);
+        let mut known = known.iter();
+        let (heard, _) = known.find(|(heard, errors)| heard.is_beside(effect, errors, self.atlas()))?;
+        Some(heard.clone())
     }
 
     /// What a hypothesis leaves of the data, in units of the declared model's scatter; `None` where the robot crashes.

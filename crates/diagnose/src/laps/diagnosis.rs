@@ -1,6 +1,6 @@
 //! The answer: which effects, how sure, what else it could be.
 
-use std::sync::OnceLock;
+use std::sync::{Mutex, OnceLock};
 
 use sim::{Setting, Vec2};
 
@@ -66,6 +66,7 @@ impl Atlas {
             scanned: OnceLock::new(),
             together: OnceLock::new(),
             descended_together: OnceLock::new(),
+            heard: Mutex::default(),
         };
         let ripple = search.ripple(&Hypothesis::nothing());
         let mut constant = screened.iter().filter(|s| s.hypothesis.is_constant());

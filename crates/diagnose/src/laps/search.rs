@@ -4,12 +4,13 @@
 use std::collections::BTreeSet;
 use std::fmt::Arguments;
 use std::ops::Range;
-use std::sync::OnceLock;
+use std::sync::{Mutex, OnceLock};
 
 use nalgebra::DMatrix;
 use sim::Vec2;
 
 use super::atlas::{Atlas, White};
+use super::beside::HeardBesideSingle;
 use super::hypothesis::Hypothesis;
 use super::intervals::Interval;
 use super::observed::ObservedRun;
@@ -58,6 +59,8 @@ pub(super) struct Search<'a> {
     pub(super) together: OnceLock<Vec<ScreenedPair>>,
     /// Where descents from the best of these led, once they were tried.
     pub(super) descended_together: OnceLock<Vec<Descent>>,
+    /// What was heard beside single effects.
+    pub(super) heard: Mutex<Vec<HeardBesideSingle>>,
 }
 
 /// Explanations beside which a further effect is sought: the best need not be part of the best with one more.
@@ -290,8 +293,7 @@ impl Search<'_> {
         let Some(left) = self.left_by(&rest) else {
             return Vec::new();
         };
-        let base = self.trial.base(rest);
-        let starts = self.beside(&base, &left, std::slice::from_ref(hypothesis));
+        let starts = self.beside(self.trial.base(rest), left, std::slice::from_ref(hypothesis));
         self.settle(self.descend_several(&starts, &ROUNDS_BESIDE, f64::NEG_INFINITY))
     }
 

@@ -1,5 +1,6 @@
 //! A second effect beside a single one that explains nearly all.
 
+use super::beside::Heard;
 use super::hunt::Moved;
 use super::hypothesis::Hypothesis;
 use super::pairs::Tried;
@@ -155,11 +156,19 @@ impl Search<'_> {
             return Promise::None;
         }
         let by_paths = promises(&screened, enough);
-        let heard = self.heard_beside(&base, screened);
-        let pairs = self.beside_of(&heard, &base, &single.left, &[]);
-        if by_paths && promises(&heard, ENOUGH) {
+        let heard = Heard {
+            others: self.heard_beside(&base, screened),
+            left: single.left.clone(),
+            base,
+        };
+        let pairs = self.with_heard(&heard, &[]);
+        let [is_enough, is_little] = [ENOUGH, little].map(|least| promises(&heard.others, least));
+        if !stands {
+            self.remember(heard, single);
+        }
+        if by_paths && is_enough {
             Promise::Enough(pairs)
-        } else if promises(&heard, little) {
+        } else if is_little {
             Promise::Little(pairs)
         } else {
             Promise::None
