@@ -55,7 +55,9 @@ fn main() {
             })
             .collect();
         group.bench_function(name, |bencher| {
-            bencher.iter(|| diagnose_logs(&scene, &runs, &|_| ()).expect("logs that can be followed"));
+            bencher.iter(|| {
+                diagnose_logs(&scene, &runs, &|_| true, &|_| ()).expect("logs that can be followed")
+            });
         });
     }
     group.finish();

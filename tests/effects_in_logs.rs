@@ -3,7 +3,8 @@
 use serde_json::Value;
 use sim::{Pattern, Setting, find};
 
-use crate::tracing::{Robot, explained_in_logs, holds};
+use crate::support::Scratch;
+use crate::tracing::{Robot, explained_in_logs, holds, says, trace};
 
 fn effect(name: &str, values: &[f64]) -> Setting {
     Setting::constant(find(name).unwrap(), values)
@@ -84,4 +85,21 @@ fn less_noise_beside_a_reading_that_falls_with_incidence() {
 fn speeds_in_steps_that_leave_the_usual_one_between_two() {
     let found = named(vec![effect("speed-step", &[0.010_764_5])], &["speed-step"]);
     holds(&found["effects"][0], "speed_m_s", 0.010_764_5, 0.0);
+}
+
+/// The logs find a bump five units more likely, by readings that no edge spoils; the laps contradict it.
+#[test]
+fn laps_tell_a_patch_from_a_bump_that_logs_do_not() {
+    let scratch = Scratch::new();
+    let patch = "world = \"roduit2007\"\n[[effect]]\nkind = \"reflectance-patch\"\nwall = \"inner\"\nposition = 0.224331\n\
+                 length_m = 0.0925242\nfactor = 1.1957\n";
+    scratch.write("patch.toml", patch);
+    let drive = "drive patch.toml --runs 4 --laps 5 --log --seed 3 --quiet --out set";
+    scratch.done(drive.split(' '));
+    let found = trace(&scratch, "braitenberg", "set", &[]);
+    says(&found, "explained", &["reflectance-patch"]);
+    assert_eq!(found["logs"]["confirmed_by_laps"], true, "{found:#}");
+    let told = serde_json::json!([["reflectance-patch"], ["wall-bump"]]);
+    assert_eq!(found["alternative_sets"], told, "{found:#}");
+    holds(&found["effects"][0], "factor", 1.1957, 1.0);
 }

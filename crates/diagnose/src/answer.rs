@@ -283,20 +283,6 @@ impl Answer {
         self.claimed().map(Explanation::settings).unwrap_or_default()
     }
 
-    /// Whether laps that it was not asked for agree with it, by how they depart from the declared model and, unless the robot then
-    /// crashes, from the model with its effects: they do where they contradict nothing, or little of what they showed is left. Where
-    /// nothing is claimed there is nothing to agree with.
-    pub fn agrees_with(&self, before: &Departures, after: Option<&Departures>) -> bool {
-        /// Probability below which laps contradict.
-        const CONTRADICTS_P: f64 = 1e-5;
-        /// Share of the excess that may be left all the same.
-        const LITTLE: f64 = 0.2;
-        let agree = |after: &Departures| {
-            after.omnibus_p() >= CONTRADICTS_P || after.excess() < LITTLE * before.excess()
-        };
-        self.verdict == Verdict::Unexplained || after.is_some_and(agree)
-    }
-
     /// This answer, unless it, or another that the data do not tell from it, is a slower wheel and more slip whose sizes
     /// follow from one another, as they do if wheels stand still in a share of the physics steps: one cause without a name,
     /// then, rather than two with theirs; so is noise without a name. `slip_level` is the declared model's.

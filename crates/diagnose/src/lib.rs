@@ -24,8 +24,8 @@ pub use laps::{
     Quadratic, Rival, Simulate, Unseen, separations,
 };
 pub use log::{
-    Channel, Decided, Implausible, LogDiagnosis, LogRow, LoggedRun, Spoilt, can_be_followed, diagnose_logs,
-    log_separation, take_out_implausible,
+    Agree, Channel, Decided, Implausible, LogDiagnosis, LogRow, LoggedRun, Spoilt, can_be_followed,
+    diagnose_logs, log_separation, take_out_implausible,
 };
 pub use mean_laps::{MeanLaps, mean_lap, rms};
 pub use outlying::{far, median};

@@ -33,6 +33,25 @@ pub(super) struct TracedLaps<'a> {
     seed: u64,
 }
 
+/// What laps make of effects that they were not asked for.
+struct Agreement {
+    /// How they depart from the declared model.
+    before: Departures,
+    /// How they depart from the model with the effects; `None` where the robot crashes.
+    after: Option<Departures>,
+    agree: bool,
+}
+
+impl Agreement {
+    fn new((before, after): (Departures, Option<Departures>)) -> Self {
+        Self {
+            agree: after.is_some_and(|after| !after.contradict(&before)),
+            before,
+            after,
+        }
+    }
+}
+
 /// What is claimed, and why.
 pub(super) struct Named {
     pub(super) residual: Departures,
@@ -87,6 +106,23 @@ impl<'a> TracedLaps<'a> {
         Ok(self.atlas.confirm(&simulate, &self.runs, effects)?)
     }
 
+    /// The same, and whether these laps agree with the effects; where sizes go by run those of the `logged` recordings do, if all
+    /// contradict: of a run without a log no size is known.
+    fn agreement(
+        &self,
+        effects: &[Setting],
+        logged: &impl Fn() -> Result<Option<Self>>,
+    ) -> Result<Agreement> {
+        let mut agreement = Agreement::new(self.confirm(effects)?);
+        if !agreement.agree
+            && effects.iter().any(Setting::goes_by_run)
+            && let Some(logged) = logged()?
+        {
+            agreement.agree = Agreement::new(logged.confirm(effects)?).agree;
+        }
+        Ok(agreement)
+    }
+
     /// Places along the track, from the arena's middle, m.
     fn places(&self) -> Vec<Vec2> {
         const APART_M: f64 = 0.28;
@@ -113,12 +149,12 @@ impl<'a> TracedLaps<'a> {
         })
     }
 
-    /// What the robot's logs say, stage by stage, and what the laps make of it; where sizes go by run, those of the `logged`
-    /// recordings alone if the laps of all contradict: of a run without a log no size is known.
+    /// What the robot's logs say, stage by stage, and what the laps make of it; `logged` are the laps of the recordings that have logs,
+    /// if not all have.
     pub(super) fn named_by_logs(
         &self,
         logs: &Logs,
-        logged: impl FnOnce() -> Result<Self>,
+        logged: impl Fn() -> Result<Option<Self>>,
         watch: &Watch<'_>,
     ) -> Result<Named> {
         let models = (self.recordings.iter()).flat_map(|recording| {
@@ -129,25 +165,23 @@ impl<'a> TracedLaps<'a> {
             .map(|(model, rows)| LoggedRun { model, rows })
             .collect();
         let first = self.recordings[logs.recordings[0]];
-        let found = diagnose_logs(&first.setup.scene, &runs, watch)
+        let agreement = |effects: &[Setting]| {
+            watch("whether the laps agree");
+            self.agreement(effects, &logged)
+        };
+        let agree = |effects: &[Setting]| agreement(effects).is_ok_and(|agreement| agreement.agree);
+        let found = diagnose_logs(&first.setup.scene, &runs, &agree, watch)
             .with_context(|| first.measured.set.name.clone())?;
-        watch("whether the laps agree");
-        let settings = found.answer.settings();
-        let (residual, after) = self.confirm(&settings)?;
-        let mut confirmed = found.answer.agrees_with(&residual, after.as_ref());
-        let goes_by_run = settings.iter().any(Setting::goes_by_run);
-        if !confirmed && goes_by_run && logs.recordings.len() < self.recordings.len() {
-            let (before, after) = logged()?.confirm(&settings)?;
-            confirmed = found.answer.agrees_with(&before, after.as_ref());
-        }
+        let Agreement { before, after, agree } = agreement(&found.answer.settings())?;
         let found = FromLogs {
-            confirmed,
+            // Where nothing is claimed there is nothing to agree with.
+            confirmed: agree || found.answer.verdict == Verdict::Unexplained,
             logs: found,
             after,
         };
         Ok(Named {
-            p: residual.omnibus_p().min(found.logs.p),
-            residual,
+            p: before.omnibus_p().min(found.logs.p),
+            residual: before,
             answer: found.answer(),
             baselines: None,
             detectable: found.logs.detectable.clone(),

@@ -274,6 +274,9 @@ pub(super) fn stages(trace: &Trace) -> Vec<Block> {
                 " The laps do not agree with what the logs say: both are shown and neither is claimed."
             }
             (true, Verdict::Unexplained) => "",
+            (true, _) if laps_decided(&trace.answer) => {
+                " The laps agree with this, and contradict what comes a little nearer by the logs alone."
+            }
             (true, _) => " The laps agree.",
         };
         blocks.push(Block::Text(format!(
@@ -284,6 +287,16 @@ pub(super) fn stages(trace: &Trace) -> Vec<Block> {
         )));
     }
     blocks
+}
+
+/// Whether the laps told the answer from another that the logs put before it.
+fn laps_decided(answer: &Answer) -> bool {
+    let (first, others) = rivals(answer).split_first().unzip();
+    first
+        .zip(others)
+        .is_some_and(|(first, others): (&Explanation, &[Explanation])| {
+            others.iter().any(|other| other.score > first.score)
+        })
 }
 
 /// What the logs say of a stage.

@@ -119,7 +119,9 @@ impl Trace {
             Some(logs) => {
                 let logged = || {
                     let logged = logs.recordings.iter().map(|&number| &recordings[number]);
-                    TracedLaps::new(session, logged.collect(), purpose, cache)
+                    (logs.recordings.len() < recordings.len())
+                        .then(|| TracedLaps::new(session, logged.collect(), purpose, cache))
+                        .transpose()
                 };
                 traced.named_by_logs(logs, logged, &watch)
             }

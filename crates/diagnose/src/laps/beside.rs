@@ -28,9 +28,9 @@ pub(super) struct Base {
 /// What goes with a hypothesis, as simulations beside it told.
 #[derive(Debug, Clone)]
 pub(super) struct Heard {
-    pub(super) base: Base,
+    base: Base,
     /// What it leaves of the data, in units of the declared model's scatter.
-    pub(super) left: White,
+    left: White,
     /// Further effects, best first.
     pub(super) others: Vec<Screened>,
 }
@@ -245,12 +245,8 @@ impl Search<'_> {
     /// A base with each of the effects that explain best what it leaves, but for those that were tried and for those that
     /// jump: [`Search::scans_beside`] is for these.
     pub(super) fn beside(&self, base: Base, left: White, tried: &[Hypothesis]) -> Vec<Hypothesis> {
-        self.with_heard(&self.hear(base, left), tried)
-    }
-
-    fn hear(&self, base: Base, left: White) -> Heard {
-        let others = self.heard_beside(&base, self.screened_beside(&base, &left));
-        Heard { base, left, others }
+        let screened = self.screened_beside(&base, &left);
+        self.with_heard(&self.hear(base, left, screened), tried)
     }
 
     /// The same of what was heard already.
@@ -279,6 +275,12 @@ impl Search<'_> {
             .collect()
     }
 
+    /// What goes with a base of what was screened beside it, as simulations tell.
+    pub(super) fn hear(&self, base: Base, left: White, screened: Vec<Screened>) -> Heard {
+        let others = self.heard_beside(&base, screened);
+        Heard { base, left, others }
+    }
+
     /// What explains best what a base leaves, by paths: effects of its own and those that jump are left out.
     pub(super) fn screened_beside(&self, base: &Base, left: &White) -> Vec<Screened> {
         let mut screened = self.atlas().screen_beside(base, left);
@@ -289,7 +291,7 @@ impl Search<'_> {
 
     /// The best of what was screened beside a base, at the sizes and with the scores that simulations give them: paths were
     /// simulated without the base, and actions do not quite add up. One group of data sets tells of which another is worth it.
-    pub(super) fn heard_beside(&self, base: &Base, screened: Vec<Screened>) -> Vec<Screened> {
+    fn heard_beside(&self, base: &Base, screened: Vec<Screened>) -> Vec<Screened> {
         const HEARD: usize = 16;
         const HEARD_TWICE: usize = 8;
         const OF_ONE_EFFECT: usize = 2;
@@ -391,7 +393,9 @@ impl Search<'_> {
         let mut all = tried.to_vec();
         for found in bases {
             self.tell(format_args!("what is beside {}", found.explanation.label()));
-            let heard = self.hear(self.trial.base(found.hypothesis.clone()), found.left.clone());
+            let base = self.trial.base(found.hypothesis.clone());
+            let screened = self.screened_beside(&base, &found.left);
+            let heard = self.hear(base, found.left.clone(), screened);
             all.extend(self.with_heard(&heard, &all));
             self.remember(heard, found);
         }
@@ -484,7 +488,31 @@ fn best_multiple(product: f64, square: f64, odd: bool) -> (f64, f64) {
 
 #[cfg(test)]
 mod tests {
-    use super::best_multiple;
+    use super::*;
+    use crate::laps::part::Shape;
+    use crate::laps::testing::atlas_of;
+
+    #[test]
+    fn what_was_heard_beside_an_effect_holds_within_the_errors_of_its_size() {
+        let atlas = atlas_of(&["wheel-scale", "turn-scrub"]);
+        let effect = |probe: usize, size: f64| Part::screened(&atlas, probe, Shape::Constant, &[size]);
+        let single = Hypothesis::of(effect(0, 1.05));
+        let errors: Vec<(Freedom, f64)> = (single.freedoms(&atlas).into_iter())
+            .map(|freedom| (freedom, 0.01))
+            .collect();
+        assert_eq!(errors.len(), 1);
+        let heard = |hypothesis: Hypothesis| Heard {
+            base: atlas.at_rest(hypothesis),
+            left: White::zeros(1),
+            others: Vec::new(),
+        };
+        let is_beside = |effect: &Part| heard(single.clone()).is_beside(effect, &errors, &atlas);
+        assert!(is_beside(&effect(0, 1.042)) && is_beside(&effect(0, 1.058)));
+        assert!(!is_beside(&effect(0, 1.038)) && !is_beside(&effect(0, 1.062)));
+        assert!(!is_beside(&effect(1, 1.05)));
+        let pair = single.with(&Hypothesis::of(effect(1, 1.05)));
+        assert!(!heard(pair).is_beside(&effect(0, 1.05), &errors, &atlas));
+    }
 
     #[test]
     fn a_multiple_is_the_vertex_of_a_parabola_within_bounds() {

@@ -1,6 +1,5 @@
 //! A second effect beside a single one that explains nearly all.
 
-use super::beside::Heard;
 use super::hunt::Moved;
 use super::hypothesis::Hypothesis;
 use super::pairs::Tried;
@@ -156,11 +155,7 @@ impl Search<'_> {
             return Promise::None;
         }
         let by_paths = promises(&screened, enough);
-        let heard = Heard {
-            others: self.heard_beside(&base, screened),
-            left: single.left.clone(),
-            base,
-        };
+        let heard = self.hear(base, single.left.clone(), screened);
         let pairs = self.with_heard(&heard, &[]);
         let [is_enough, is_little] = [ENOUGH, little].map(|least| promises(&heard.others, least));
         if !stands {

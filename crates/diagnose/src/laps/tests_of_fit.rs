@@ -114,6 +114,16 @@ impl Departures {
         [self.mean, self.runs, self.trend, self.noise, self.start]
     }
 
+    /// Whether laps that depart so from a model with effects speak against these, where they depart from the declared model as they did
+    /// `before`: more than chance allows is left, and not little of what they showed.
+    pub fn contradict(&self, before: &Self) -> bool {
+        /// Probability below which laps contradict.
+        const CONTRADICTS_P: f64 = 1e-5;
+        /// Share of the excess that may be left all the same.
+        const LITTLE: f64 = 0.2;
+        self.omnibus_p() < CONTRADICTS_P && self.excess() >= LITTLE * before.excess()
+    }
+
     /// What exceeds the expectation in all together.
     pub fn excess(&self) -> f64 {
         self.all().iter().map(Quadratic::excess).sum()

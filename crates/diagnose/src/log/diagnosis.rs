@@ -15,10 +15,10 @@ use super::leads::Lead;
 use super::recut::recut;
 use super::refined::Refined;
 use super::rows::{LogRow, LoggedRun, bridged, without_logs};
-use super::search::{NOT_FAR, RIVAL, Search};
+use super::search::{FAULTS, NOT_FAR, RIVAL, Search};
 use super::steps::{reading_step, written_step};
 use super::unnamed::Unnamed;
-use crate::answer::indistinguishable;
+use crate::answer::{ALTERNATIVE, indistinguishable};
 use crate::candidate::stage_of;
 use crate::corners::{Corners, EXACT};
 use crate::{Answer, Candidate, Cause, Detectable, Error, Explanation, Verdict, Watch};
@@ -53,8 +53,12 @@ pub struct Spoilt {
     pub readings: Vec<Vec<Implausible>>,
 }
 
+/// Whether laps, which were not asked for them, agree with effects.
+pub type Agree<'a> = dyn Fn(&[Setting]) -> bool + 'a;
+
 /// What the robot's logs say that the model lacks, which may be declared otherwise in some runs than in others, but for its walls, its
-/// body and the places of its sensors; `watch` is told what is being tried.
+/// body and the places of its sensors. Of what they do not tell apart comes first what laps `agree` with; `watch` is told what is being
+/// tried.
 ///
 /// # Errors
 /// A logged run's model that the scene was not made for; logs of which no stretch of 200 control steps with positions and commands
@@ -62,6 +66,7 @@ pub struct Spoilt {
 pub fn diagnose_logs(
     scene: &Scene,
     runs: &[LoggedRun<'_>],
+    agree: &Agree<'_>,
     watch: &Watch<'_>,
 ) -> Result<LogDiagnosis, Error> {
     watch("the controller");
@@ -114,6 +119,7 @@ pub fn diagnose_logs(
         wide: &wide,
         declared: &declared,
         leads: &leads,
+        agree,
         watch,
     };
     logs.between_walls(search, corners_of(&first), was_clear, 0, (decision, spoilt))
@@ -125,6 +131,7 @@ struct Logs<'l> {
     wide: &'l Model,
     declared: &'l Evidence<'l>,
     leads: &'l [Lead],
+    agree: &'l Agree<'l>,
     watch: &'l Watch<'l>,
 }
 
@@ -184,8 +191,9 @@ impl Logs<'_> {
             let is_clear = search.evidence.clear_with_each(search.rivals()).is_none();
             return self.between_walls(search, corners, is_clear, further + 1, rest);
         }
-        search.finish();
         let (decision, spoilt) = rest;
+        search.prefer_what_laps_agree_with(&decision.decided, self.agree);
+        search.finish();
         Ok(search.answer(decision, spoilt, corners))
     }
 }
@@ -271,6 +279,30 @@ impl Search<'_> {
             corners,
             steps: self.control_steps,
             detectable: self.detectable,
+        }
+    }
+
+    /// Of the explanations that the logs do not tell from the best, or but for faults of models, the first that laps agree with becomes
+    /// the best, if there is one.
+    fn prefer_what_laps_agree_with(&mut self, decide: &Decided, agree: &Agree<'_>) {
+        let Some(best) = self.found.first().filter(|_| self.unnamed.is_none()) else {
+            return;
+        };
+        let least = best.score() - ALTERNATIVE.max(FAULTS * best.gain);
+        let is_alike =
+            |other: &Refined| other.score() >= least && other.settings.len() == best.settings.len();
+        let alike: Vec<usize> = (0..self.found.len())
+            .filter(|&place| is_alike(&self.found[place]))
+            .collect();
+        if alike.len() < 2 {
+            return;
+        }
+        let certain: Vec<Setting> = (self.certain(decide).into_iter())
+            .map(|candidate| candidate.setting)
+            .collect();
+        let agrees = |place: &&usize| agree(&[certain.as_slice(), &self.found[**place].settings].concat());
+        if let Some(&first) = alike.iter().find(agrees) {
+            self.found[..=first].rotate_right(1);
         }
     }
 

@@ -49,7 +49,7 @@ mod separation;
 
 pub use channels::Channel;
 pub use decide::Decided;
-pub use diagnosis::{LogDiagnosis, Spoilt, diagnose_logs};
+pub use diagnosis::{Agree, LogDiagnosis, Spoilt, diagnose_logs};
 pub use implausible::{Implausible, take_out_implausible};
 pub use rows::{LogRow, LoggedRun, can_be_followed};
 pub use separation::log_separation;
