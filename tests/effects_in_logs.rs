@@ -87,6 +87,20 @@ fn speeds_in_steps_that_leave_the_usual_one_between_two() {
     holds(&found["effects"][0], "speed_m_s", 0.010_764_5, 0.0);
 }
 
+/// Beside the scale of the wheels a wall that reflects less stands for the distances, and leaves most of what one sensor does.
+#[test]
+fn three_effects_of_which_another_stood_for_one() {
+    let effects = vec![
+        effect("distance-scale", &[0.93]),
+        effect("wheel-scale", &[1.05]),
+        effect("one-sensor-gain", &[2.0, 0.8]),
+    ];
+    let found = named(effects, &["wheel-scale", "one-sensor-gain", "distance-scale"]);
+    holds(&found["effects"][0], "factor", 1.05, 1.0);
+    holds(&found["effects"][1], "gain", 0.8, 1.0);
+    holds(&found["effects"][2], "scale", 0.93, 1.0);
+}
+
 /// The logs find a bump five units more likely, by readings that no edge spoils; the laps contradict it.
 #[test]
 fn laps_tell_a_patch_from_a_bump_that_logs_do_not() {

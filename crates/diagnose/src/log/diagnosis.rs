@@ -191,6 +191,9 @@ impl Logs<'_> {
             let is_clear = search.evidence.clear_with_each(search.rivals()).is_none();
             return self.between_walls(search, corners, is_clear, further + 1, rest);
         }
+        if further <= MOST && search.unnamed.is_none() && search.exchange() {
+            return self.between_walls(search, corners, true, MOST + 1, rest);
+        }
         let (decision, spoilt) = rest;
         search.prefer_what_laps_agree_with(&decision.decided, self.agree);
         search.finish();

@@ -10,7 +10,9 @@ use super::noise::{Factor, by_chance, noises, p_among_repeats};
 use super::pairs::{Pair, pairs};
 use super::refined::Refined;
 use super::repeat::repeats;
-use super::search::{FAULTS, FIRST_STEPS, MATTERS, PROMISING, STEPS, Search, least_in_reach, most_left};
+use super::search::{
+    FAULTS, FIRST_STEPS, MATTERS, PROMISING, STEPS, Search, least_in_reach, most_left, screened,
+};
 use crate::laps::SIGNIFICANT_P;
 
 impl Search<'_> {
@@ -66,6 +68,40 @@ impl Search<'_> {
         more.iter_mut().for_each(|several| several.faults = owed);
         self.found.extend(more);
         self.sort();
+    }
+
+    /// Looks, where the best candidate of several effects leaves what matters, for others in place of each of them: the first effects stood
+    /// for a part of those that were not found yet. Whether there is a better candidate then.
+    pub(super) fn exchange(&mut self) -> bool {
+        /// Leads in place of an effect.
+        const EACH: usize = 3;
+        /// Log-likelihood that is worth it.
+        const BETTER: f64 = 10.0;
+        let Some(best) = self.found.first().filter(|best| best.settings.len() > 1).cloned() else {
+            return false;
+        };
+        if self.settle(&best).is_none() || !self.remainder.matters() {
+            return false;
+        }
+        let in_place_of = |place: usize| {
+            let (less, own) = (best.less(place), best.settings[place].spec);
+            let screened = screened(&self.evidence, &less.settings, &self.variants);
+            let leads = screened.map_or(Vec::new(), |(_, leads)| leads);
+            let list = shortlist(&of_constant_size(&leads), &self.variants, EACH + 1);
+            (list.iter())
+                .map(|lead| (lead, &self.variants[lead.variant]))
+                .filter(|(_, variant)| variant.spec != own)
+                .take(EACH)
+                .map(|(lead, variant)| less.with(lead.in_pattern(variant, &self.evidence)))
+                .collect::<Vec<_>>()
+        };
+        let starts = (0..best.settings.len()).flat_map(in_place_of).collect();
+        let mut others = self.pursued_together(starts);
+        others.retain(|other| other.score() > best.score() + BETTER);
+        let is_better = !others.is_empty();
+        self.found.extend(others);
+        self.sort();
+        is_better
     }
 
     /// Log-likelihood that a column must gain beside the best candidate to be more than a fault of the filter, which is linear
