@@ -187,12 +187,19 @@ impl Logs<'_> {
         if further == 0 {
             search.unnamed = search.unnamed_before_pairs(self.leads);
         }
-        if further < MOST && search.unnamed.is_none() && search.one_more(self.leads) {
+        let found = if search.unnamed.is_some() {
+            None
+        } else if further < MOST && search.one_more(self.leads) {
+            Some(further + 1)
+        } else if further <= MOST && search.exchange() {
+            // What is found in place of others is the last.
+            Some(MOST + 1)
+        } else {
+            None
+        };
+        if let Some(further) = found {
             let is_clear = search.evidence.clear_with_each(search.rivals()).is_none();
-            return self.between_walls(search, corners, is_clear, further + 1, rest);
-        }
-        if further <= MOST && search.unnamed.is_none() && search.exchange() {
-            return self.between_walls(search, corners, true, MOST + 1, rest);
+            return self.between_walls(search, corners, is_clear, further, rest);
         }
         let (decision, spoilt) = rest;
         search.prefer_what_laps_agree_with(&decision.decided, self.agree);
