@@ -15,7 +15,7 @@ use super::leads::Lead;
 use super::recut::recut;
 use super::refined::Refined;
 use super::rows::{LogRow, LoggedRun, bridged, without_logs};
-use super::search::{FAULTS, NOT_FAR, RIVAL, Search};
+use super::search::{NOT_FAR, RIVAL, Search};
 use super::steps::{reading_step, written_step};
 use super::unnamed::Unnamed;
 use crate::answer::{ALTERNATIVE, indistinguishable};
@@ -292,15 +292,14 @@ impl Search<'_> {
         }
     }
 
-    /// Of the explanations that the logs do not tell from the best, or but for faults of models, the first that laps agree with becomes
-    /// the best, if there is one.
+    /// Of the explanations that the logs do not tell from the best the first that laps agree with becomes the best, if there is one.
     fn prefer_what_laps_agree_with(&mut self, decide: &Decided, agree: &Agree<'_>) {
         let Some(best) = self.found.first().filter(|_| self.unnamed.is_none()) else {
             return;
         };
-        let least = best.score() - ALTERNATIVE.max(FAULTS * best.gain);
-        let is_alike =
-            |other: &Refined| other.score() >= least && other.settings.len() == best.settings.len();
+        let is_alike = |other: &Refined| {
+            other.score() >= best.score() - ALTERNATIVE && other.settings.len() == best.settings.len()
+        };
         let alike: Vec<usize> = (0..self.found.len())
             .filter(|&place| is_alike(&self.found[place]))
             .collect();
