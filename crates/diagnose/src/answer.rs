@@ -100,7 +100,7 @@ impl Explanation {
     }
 
     /// Whether data do not tell another one from it: of as many effects, with a cause without a name if it has one, and not so far behind.
-    fn is_not_told_from(&self, other: &Self) -> bool {
+    pub(crate) fn is_not_told_from(&self, other: &Self) -> bool {
         other.score >= self.score - self.tells_apart()
             && other.effects.len() == self.effects.len()
             && other.has_no_name() == self.has_no_name()

@@ -1,5 +1,7 @@
 //! What laps and the robot's logs say together.
 
+use std::cell::RefCell;
+
 use anyhow::{Context, Result};
 use diagnose::{
     Answer, Atlas, Baselines, Departures, Detectable, Explanation, Extent, LogDiagnosis, LoggedRun,
@@ -34,6 +36,7 @@ pub(super) struct TracedLaps<'a> {
 }
 
 /// What laps make of effects that they were not asked for.
+#[derive(Clone, Copy)]
 struct Agreement {
     /// How they depart from the declared model.
     before: Departures,
@@ -165,9 +168,19 @@ impl<'a> TracedLaps<'a> {
             .map(|(model, rows)| LoggedRun { model, rows })
             .collect();
         let first = self.recordings[logs.recordings[0]];
+        // What the logs do not tell apart was asked already.
+        let last: RefCell<Option<(Vec<Setting>, Agreement)>> = RefCell::default();
         let agreement = |effects: &[Setting]| {
-            watch("whether the laps agree");
-            self.agreement(effects, &logged)
+            let known = last.take().filter(|(known, _)| known == effects);
+            let agreement = match known {
+                Some((_, agreement)) => agreement,
+                None => {
+                    watch("whether the laps agree");
+                    self.agreement(effects, &logged)?
+                }
+            };
+            last.replace(Some((effects.to_vec(), agreement)));
+            Ok::<_, anyhow::Error>(agreement)
         };
         let agree = |effects: &[Setting]| agreement(effects).is_ok_and(|agreement| agreement.agree);
         let found = diagnose_logs(&first.setup.scene, &runs, &agree, watch)

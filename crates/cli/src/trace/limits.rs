@@ -291,12 +291,8 @@ pub(super) fn stages(trace: &Trace) -> Vec<Block> {
 
 /// Whether the laps told the answer from another that the logs put before it.
 fn laps_decided(answer: &Answer) -> bool {
-    let (first, others) = rivals(answer).split_first().unzip();
-    first
-        .zip(others)
-        .is_some_and(|(first, others): (&Explanation, &[Explanation])| {
-            others.iter().any(|other| other.score > first.score)
-        })
+    let rivals = rivals(answer);
+    rivals.iter().any(|other| other.score > rivals[0].score)
 }
 
 /// What the logs say of a stage.

@@ -8,6 +8,7 @@ use sim::Setting;
 use super::atlas::{Atlas, White, in_other_units, white};
 use super::expectation::{Expectation, Scatter};
 use super::hypothesis::Hypothesis;
+use super::memo::NO_PANIC;
 use super::parabola::groups;
 use super::part::{Freedom, Part};
 use super::path::Node;
@@ -238,15 +239,11 @@ impl Atlas {
     }
 }
 
-/// Why a lock is not poisoned.
-const NO_PANIC: &str = "no thread panics while it holds the list";
-
 impl Search<'_> {
     /// A base with each of the effects that explain best what it leaves, but for those that were tried and for those that
     /// jump: [`Search::scans_beside`] is for these.
     pub(super) fn beside(&self, base: Base, left: White, tried: &[Hypothesis]) -> Vec<Hypothesis> {
-        let screened = self.screened_beside(&base, &left);
-        self.with_heard(&self.hear(base, left, screened), tried)
+        self.with_heard(&self.hear(base, left), tried)
     }
 
     /// The same of what was heard already.
@@ -275,8 +272,14 @@ impl Search<'_> {
             .collect()
     }
 
-    /// What goes with a base of what was screened beside it, as simulations tell.
-    pub(super) fn hear(&self, base: Base, left: White, screened: Vec<Screened>) -> Heard {
+    /// What goes with a base.
+    fn hear(&self, base: Base, left: White) -> Heard {
+        let screened = self.screened_beside(&base, &left);
+        self.hear_screened(base, left, screened)
+    }
+
+    /// The same of what was screened beside it.
+    pub(super) fn hear_screened(&self, base: Base, left: White, screened: Vec<Screened>) -> Heard {
         let others = self.heard_beside(&base, screened);
         Heard { base, left, others }
     }
@@ -394,8 +397,7 @@ impl Search<'_> {
         for found in bases {
             self.tell(format_args!("what is beside {}", found.explanation.label()));
             let base = self.trial.base(found.hypothesis.clone());
-            let screened = self.screened_beside(&base, &found.left);
-            let heard = self.hear(base, found.left.clone(), screened);
+            let heard = self.hear(base, found.left.clone());
             all.extend(self.with_heard(&heard, &all));
             self.remember(heard, found);
         }

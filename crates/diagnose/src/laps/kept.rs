@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 use sim::Setting;
 
 use super::atlas::{Spent, White};
+use super::memo::NO_PANIC;
 use super::simulated::Draws;
 use super::trial::Trial;
 
@@ -54,9 +55,7 @@ impl Kept {
     }
 
     fn known(&self) -> MutexGuard<'_, BTreeMap<String, Action>> {
-        self.known
-            .lock()
-            .expect("no thread panics while it holds the list")
+        self.known.lock().expect(NO_PANIC)
     }
 }
 

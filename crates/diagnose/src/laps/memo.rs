@@ -11,6 +11,9 @@ use super::observed::ObservedRun;
 /// Data sets that are kept: a search goes on from where it was a moment ago. Of 80 laps and 100 gates they take 64 MB.
 const KEPT: usize = 256;
 
+/// Why the lock of a list is not poisoned.
+pub(super) const NO_PANIC: &str = "no thread panics while it holds the list";
+
 /// A simulated data set.
 struct Known {
     effects: Vec<Setting>,
@@ -56,9 +59,7 @@ impl<'a> Memo<'a> {
     }
 
     fn known(&self) -> std::sync::MutexGuard<'_, VecDeque<Known>> {
-        self.known
-            .lock()
-            .expect("no thread panics while it holds the list")
+        self.known.lock().expect(NO_PANIC)
     }
 }
 

@@ -155,7 +155,7 @@ impl Search<'_> {
             return Promise::None;
         }
         let by_paths = promises(&screened, enough);
-        let heard = self.hear(base, single.left.clone(), screened);
+        let heard = self.hear_screened(base, single.left.clone(), screened);
         let pairs = self.with_heard(&heard, &[]);
         let [is_enough, is_little] = [ENOUGH, little].map(|least| promises(&heard.others, least));
         if !stands {

@@ -18,7 +18,7 @@ use super::rows::{LogRow, LoggedRun, bridged, without_logs};
 use super::search::{NOT_FAR, RIVAL, Search};
 use super::steps::{reading_step, written_step};
 use super::unnamed::Unnamed;
-use crate::answer::{ALTERNATIVE, indistinguishable};
+use crate::answer::indistinguishable;
 use crate::candidate::stage_of;
 use crate::corners::{Corners, EXACT};
 use crate::{Answer, Candidate, Cause, Detectable, Error, Explanation, Verdict, Watch};
@@ -294,22 +294,19 @@ impl Search<'_> {
 
     /// Of the explanations that the logs do not tell from the best the first that laps agree with becomes the best, if there is one.
     fn prefer_what_laps_agree_with(&mut self, decide: &Decided, agree: &Agree<'_>) {
-        let Some(best) = self.found.first().filter(|_| self.unnamed.is_none()) else {
+        if self.unnamed.is_some() {
             return;
-        };
-        let is_alike = |other: &Refined| {
-            other.score() >= best.score() - ALTERNATIVE && other.settings.len() == best.settings.len()
-        };
-        let alike: Vec<usize> = (0..self.found.len())
-            .filter(|&place| is_alike(&self.found[place]))
+        }
+        let certain = self.certain(decide);
+        let explained = |refined: &Refined| self.explanation(refined, &certain);
+        let explanations: Vec<Explanation> = self.found.iter().map(explained).collect();
+        let alike: Vec<usize> = (0..explanations.len())
+            .filter(|&place| explanations[0].is_not_told_from(&explanations[place]))
             .collect();
         if alike.len() < 2 {
             return;
         }
-        let certain: Vec<Setting> = (self.certain(decide).into_iter())
-            .map(|candidate| candidate.setting)
-            .collect();
-        let agrees = |place: &&usize| agree(&[certain.as_slice(), &self.found[**place].settings].concat());
+        let agrees = |place: &&usize| agree(&explanations[**place].settings());
         if let Some(&first) = alike.iter().find(agrees) {
             self.found[..=first].rotate_right(1);
         }
