@@ -10,6 +10,7 @@ mod least_squares;
 mod log;
 mod mean_laps;
 mod outlying;
+mod remembered;
 mod response_fit;
 mod sightings;
 mod slip;

@@ -8,7 +8,6 @@ use sim::Setting;
 use super::atlas::{Atlas, White, in_other_units, white};
 use super::expectation::{Expectation, Scatter};
 use super::hypothesis::Hypothesis;
-use super::memo::NO_PANIC;
 use super::parabola::groups;
 use super::part::{Freedom, Part};
 use super::path::Node;
@@ -16,6 +15,7 @@ use super::screen::{Screened, without_directions};
 use super::search::{Found, Search, WEAK};
 use super::simulated::Draws;
 use super::trial::Trial;
+use crate::remembered::NO_PANIC;
 
 /// A hypothesis beside which another effect is sought.
 #[derive(Debug, Clone)]

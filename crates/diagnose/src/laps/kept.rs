@@ -8,9 +8,9 @@ use serde::{Deserialize, Serialize};
 use sim::Setting;
 
 use super::atlas::{Spent, White};
-use super::memo::NO_PANIC;
 use super::simulated::Draws;
 use super::trial::Trial;
+use crate::remembered::NO_PANIC;
 
 /// Actions that were simulated once and are kept with the atlas: every other data set asks for them again.
 #[derive(Debug, Default)]

@@ -1,65 +1,41 @@
 //! Simulated laps that are asked for again.
 
-use std::collections::VecDeque;
-use std::sync::Mutex;
-
 use sim::Setting;
 
 use super::atlas::{Extent, Simulate};
 use super::observed::ObservedRun;
+use crate::remembered::Remembered;
 
 /// Data sets that are kept: a search goes on from where it was a moment ago. Of 80 laps and 100 gates they take 64 MB.
 const KEPT: usize = 256;
 
-/// Why the lock of a list is not poisoned.
-pub(super) const NO_PANIC: &str = "no thread panics while it holds the list";
-
-/// A simulated data set.
-struct Known {
-    effects: Vec<Setting>,
-    set: u64,
-    extent: Extent,
-    /// The laps of its runs; `None` where one crashes or stops.
-    runs: Option<Vec<ObservedRun>>,
-}
+/// Effects, the number of a data set and its extent.
+type Asked = (Vec<Setting>, u64, Extent);
 
 /// A simulation that remembers its latest data sets.
 pub(super) struct Memo<'a> {
     simulate: &'a Simulate<'a>,
-    /// Oldest first.
-    known: Mutex<VecDeque<Known>>,
+    /// The laps of their runs; `None` where one crashes or stops.
+    known: Remembered<Asked, Option<Vec<ObservedRun>>>,
 }
 
 impl<'a> Memo<'a> {
     pub(super) fn new(simulate: &'a Simulate<'a>) -> Self {
         Self {
             simulate,
-            known: Mutex::default(),
+            known: Remembered::new(KEPT),
         }
     }
 
     /// One data set; see [`Simulate`].
     pub(super) fn simulate(&self, effects: &[Setting], set: u64, extent: Extent) -> Option<Vec<ObservedRun>> {
-        let is_it = |known: &&Known| (known.set, known.extent) == (set, extent) && known.effects == effects;
-        if let Some(known) = self.known().iter().find(is_it) {
-            return known.runs.clone();
+        let is_it = |asked: &Asked| (asked.1, asked.2) == (set, extent) && asked.0 == effects;
+        if let Some(runs) = self.known.find(is_it) {
+            return runs;
         }
         let runs = (self.simulate)(effects, set, extent);
-        let mut known = self.known();
-        if known.len() == KEPT {
-            known.pop_front();
-        }
-        known.push_back(Known {
-            effects: effects.to_vec(),
-            set,
-            extent,
-            runs: runs.clone(),
-        });
+        self.known.keep((effects.to_vec(), set, extent), runs.clone());
         runs
-    }
-
-    fn known(&self) -> std::sync::MutexGuard<'_, VecDeque<Known>> {
-        self.known.lock().expect(NO_PANIC)
     }
 }
 

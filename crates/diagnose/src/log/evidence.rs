@@ -14,6 +14,7 @@ use super::rows::{LogRow, stretches};
 use super::steps::WHOLE;
 use crate::Error;
 use crate::candidate::{apart, bounded, stage_of};
+use crate::remembered::Remembered;
 
 /// A stretch of one run's log and what of it counts.
 #[derive(Debug, Clone)]
@@ -34,6 +35,28 @@ pub(crate) struct Evidence<'a> {
     pub(crate) measured_runs: usize,
     /// Step that the readings are rounded to, by the robot or by the file, counts.
     pub(crate) step_counts: f64,
+    /// What was asked of it before.
+    pub(super) asked: Asked,
+}
+
+/// What was asked of evidence: the same settings come back from one stage of a search to the next.
+#[derive(Debug)]
+pub(super) struct Asked {
+    /// Log-likelihoods by stretch; `None` where the filter lost the robot.
+    likelihoods: Remembered<Vec<Setting>, Option<Vec<f64>>>,
+    assessments: Remembered<(Vec<Setting>, Vec<Knob>), Option<Assessment>>,
+}
+
+impl Asked {
+    /// Nothing yet.
+    pub(super) fn nothing() -> Self {
+        /// Those that are kept of each kind: all of a search for three effects, few kilobytes each.
+        const KEPT: usize = 512;
+        Self {
+            likelihoods: Remembered::new(KEPT),
+            assessments: Remembered::new(KEPT),
+        }
+    }
 }
 
 /// How far rays are cast, as a multiple of the range: a little beyond it they tell how far away a wall is that is not seen.
@@ -156,6 +179,7 @@ impl<'a> Evidence<'a> {
             stretches: stretches.into_iter().flatten().collect(),
             measured_runs: runs.len(),
             step_counts,
+            asked: Asked::nothing(),
         })
     }
 
@@ -200,6 +224,7 @@ impl<'a> Evidence<'a> {
         let stretches = self.stretches.iter().filter(|stretch| wanted(stretch.run));
         Self {
             stretches: stretches.cloned().collect(),
+            asked: Asked::nothing(),
             ..*self
         }
     }
@@ -216,6 +241,7 @@ impl<'a> Evidence<'a> {
             stretches,
             measured_runs: self.measured_runs,
             step_counts: self.step_counts,
+            asked: Asked::nothing(),
         }
     }
 
@@ -243,7 +269,11 @@ impl<'a> Evidence<'a> {
             Some(own)
         };
         let stretches: Vec<Stretch<'a>> = (self.stretches.par_iter().map(narrowed)).collect::<Option<_>>()?;
-        let narrowed = Self { stretches, ..*self };
+        let narrowed = Self {
+            stretches,
+            asked: Asked::nothing(),
+            ..*self
+        };
         let (before, left) = (self.numbers(), narrowed.numbers());
         ((before - left) as f64 > FEW * before as f64).then_some(narrowed)
     }
@@ -261,11 +291,17 @@ impl<'a> Evidence<'a> {
 
     /// The same by stretch.
     pub(crate) fn likelihoods(&self, settings: &[Setting]) -> Option<Vec<f64>> {
+        let likelihoods = &self.asked.likelihoods;
+        if let Some(known) = likelihoods.find(|asked| asked == settings) {
+            return known;
+        }
         let of_stretch = |stretch: &Stretch<'_>| {
             let world = self.world(settings, stretch.run).ok()?;
             likelihood(&world, stretch.rows, &stretch.used, self.step_counts)
         };
-        self.stretches.par_iter().map(of_stretch).collect()
+        let found: Option<Vec<f64>> = self.stretches.par_iter().map(of_stretch).collect();
+        likelihoods.keep(settings.to_vec(), found.clone());
+        found
     }
 
     pub(crate) fn world(&self, settings: &[Setting], run: usize) -> Result<World<'a>, sim::Error> {
@@ -289,6 +325,22 @@ impl<'a> Evidence<'a> {
 
     /// The log-likelihood with these effects and its derivatives with the knobs.
     pub(crate) fn assess(&self, settings: &[Setting], knobs: &[Knob]) -> Option<Assessment> {
+        let Asked {
+            likelihoods,
+            assessments,
+        } = &self.asked;
+        if let Some(known) = assessments.find(|asked| asked.0 == settings && asked.1 == knobs) {
+            return known;
+        }
+        let found = self.assessed_anew(settings, knobs);
+        if let Some(found) = &found {
+            likelihoods.keep(settings.to_vec(), Some(found.log_likelihood.clone()));
+        }
+        assessments.keep((settings.to_vec(), knobs.to_vec()), found.clone());
+        found
+    }
+
+    fn assessed_anew(&self, settings: &[Setting], knobs: &[Knob]) -> Option<Assessment> {
         let parts: Option<Vec<(f64, Normal)>> = self
             .stretches
             .par_iter()

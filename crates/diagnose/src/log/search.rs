@@ -8,7 +8,7 @@ use sim::{Setting, World};
 use super::catalogue::Variant;
 use super::channels::{Channel, channels};
 use super::detectable::detectable;
-use super::evidence::Evidence;
+use super::evidence::{Asked, Evidence};
 use super::filter::{MEASURED, Trace};
 use super::leads::{By, Lead, leads, least_p, most, shortlist};
 use super::noise::{Factor, by_chance, detectable_noises, noises, p_among, p_among_repeats, with_memory};
@@ -103,6 +103,7 @@ impl<'a> Search<'a> {
         let base: Vec<f64> = traces.iter().map(|(_, trace)| trace.log_likelihood).collect();
         let unrounded = Evidence {
             step_counts: 0.0,
+            asked: Asked::nothing(),
             ..evidence.elsewhere(evidence.scene)
         };
         let rounding_gain = match rounding_counts {

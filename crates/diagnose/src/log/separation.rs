@@ -2,7 +2,7 @@
 
 use sim::{Model, Pattern, Scene, Setting, find};
 
-use super::evidence::{Evidence, widened};
+use super::evidence::{Asked, Evidence, widened};
 use super::groups::{area_variants, unlisted_variants};
 use super::refine::{knobs_of, refine};
 use super::rows::LogRow;
@@ -26,6 +26,7 @@ pub fn log_separation(
     let masks = Evidence::new(&scene, &true_models, runs, written_step(runs)).ok()?;
     let evidence = Evidence {
         models: &models,
+        asked: Asked::nothing(),
         ..masks
     };
     let [answer, rival] = [answer, rival].map(with_levels);
