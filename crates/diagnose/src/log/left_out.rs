@@ -5,7 +5,7 @@ use sim::{Pattern, Setting};
 
 use super::catalogue::Variant;
 use super::evidence::Evidence;
-use super::noise::is_noise;
+use super::noise::{is_noise, top_of_parabola};
 use super::refine::{jumps, knobs_of, one_step};
 use super::refined::Refined;
 
@@ -102,14 +102,7 @@ impl Tried {
 
     /// The size at the top of a parabola through three over the size's logarithm; `None` if it has none near them.
     fn vertex(&self, totals: &[f64]) -> Option<Setting> {
-        let &[low, middle, high] = totals else {
-            return None;
-        };
-        let bend = high - 2.0 * middle + low;
-        let steps = -0.5 * (high - low) / bend;
-        if bend >= 0.0 || steps.abs() > 2.0 {
-            return None;
-        }
+        let steps = top_of_parabola(totals.try_into().ok()?).filter(|steps| steps.abs() <= 2.0)?;
         let [before, at] = [0, 1].map(|i| self.settings[i].pattern.numbers()[0]);
         Some(Setting::constant(
             self.settings[1].spec,

@@ -66,7 +66,7 @@ pub(crate) fn by_chance(noise: &[Factor]) -> f64 {
 /// robots as declared the slip level is found 2 to 4 % low, with a stated error of 0.5 %. A gain that this could make is
 /// compared with those in simulated logs (Student's t), and so is one of `faults` or less; one whose p is `level` or more by the
 /// likelihood stays as it is. Readings in coarse steps are no normal numbers: no gain is beyond their faults.
-/// Half of the logs are enough where these make plain chance of it.
+/// Half of the logs are enough where these make plain chance of it, or plainly none.
 pub(crate) fn p_among_repeats(
     evidence: &Evidence<'_>,
     settings: &[Setting],
@@ -76,12 +76,12 @@ pub(crate) fn p_among_repeats(
 ) -> f64 {
     /// Log-likelihood that no fault of the filter gains.
     const SURE: f64 = 50.0;
-    /// The logs that are simulated first, those that follow, and the probability that the first alone make of what is plainly chance.
+    /// The logs that are simulated first and those that follow.
     const FIRST: Range<u64> = 0..REPEATS / 2;
     const OTHERS: Range<u64> = REPEATS / 2..REPEATS;
-    const PLAINLY: f64 = 0.5;
-    /// How far to either side the first parabola of a simulated log reaches.
-    const NEAR: f64 = 0.06;
+    /// Probability that the first alone make of what is plainly chance, and share of the level that they make of what plainly is not.
+    const CHANCE: f64 = 0.5;
+    const NO_CHANCE: f64 = 0.1;
     let of_factor = |factor: &Factor| {
         let p = factor.p();
         if p >= level || factor.gain > faults.max(SURE) && !evidence.is_coarse() {
@@ -89,17 +89,13 @@ pub(crate) fn p_among_repeats(
         }
         let of_log = |repeated: &Evidence<'_>| {
             let base = repeated.likelihood(settings)?;
-            let near = Factor {
-                half: NEAR,
-                ..Factor::neutral(factor.spec)
-            };
-            Some(near.best(repeated, settings, base)?.middle)
+            Factor::neutral(factor.spec).top_near(repeated, settings, base)
         };
         let among =
             |logs: &[f64]| p_among(factor.middle, logs).map_or(p, |among| p.max(FACTORS * among).min(1.0));
         let mut logs = some_repeats(evidence, settings, FIRST, of_log);
         let first = among(&logs);
-        if first > PLAINLY {
+        if first > CHANCE || first < NO_CHANCE * level {
             return first;
         }
         logs.extend(some_repeats(evidence, settings, OTHERS, of_log));
@@ -196,25 +192,32 @@ impl Factor {
         settings.iter().cloned().chain([own]).collect()
     }
 
+    /// The logarithms of the smallest and the largest factor.
+    fn range(&self) -> [f64; 2] {
+        let param = &self.spec.params[0];
+        [param.low, param.high].map(f64::ln)
+    }
+
+    /// Whether factors so far to either side are in range.
+    fn reaches(&self, half: f64) -> bool {
+        let [lowest, highest] = self.range();
+        self.middle - half >= lowest && self.middle + half <= highest
+    }
+
     /// Goes to the top of a parabola through the log-likelihood over the factor's logarithm, or to the best of its points;
     /// breaks where it came to rest.
     fn round(&mut self, evidence: &Evidence<'_>, settings: &[Setting], base: f64) -> Option<ControlFlow<()>> {
+        /// How far to either side a parabola reaches at least.
+        const LEAST: f64 = 0.02;
         let (middle, half) = (self.middle, self.half);
-        let param = &self.spec.params[0];
-        let [lowest, highest] = [param.low, param.high].map(f64::ln);
-        if middle - half < lowest || middle + half > highest {
-            // At the end of the range.
+        let [lowest, highest] = self.range();
+        if !self.reaches(half) {
             return Some(ControlFlow::Break(()));
         }
         let at = |log: f64| Some(self.at(evidence, settings, log)? - base);
         let (low, high) = (at(middle - half)?, at(middle + half)?);
-        let slope = (high - low) / (2.0 * half);
-        let bend = (high - 2.0 * self.gain + low) / (half * half);
-        let step = if bend < 0.0 {
-            (-slope / bend).clamp(-1.2, 1.2)
-        } else {
-            0.8 * slope.signum()
-        };
+        let top = top_of_parabola([low, self.gain, high]).map(|steps| steps * half);
+        let step = top.map_or(0.8 * (high - low).signum(), |step| step.clamp(-1.2, 1.2));
         let step = step.clamp(lowest - middle, highest - middle);
         // The best of the three is a start as good as the vertex of their parabola.
         let tried = [
@@ -224,17 +227,40 @@ impl Factor {
         ];
         let best = tried.into_iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
         let moved = (best.0 - middle).abs();
-        if best.1 > self.gain {
+        let is_better = best.1 > self.gain;
+        if is_better {
             (self.middle, self.gain) = best;
         }
-        self.half = (0.4 * half).max(0.02);
+        self.half = (0.4 * half).max(LEAST);
         let nothing = self.gain < NOTHING && self.middle.abs() < half;
         let rests = half < 0.03 && (moved < 0.2 * half || step.abs() < 0.2 * half);
-        Some(if bend < 0.0 && (nothing || rests) {
+        // The next round would ask for the same.
+        let stays = !is_better && half <= LEAST;
+        Some(if stays || top.is_some() && (nothing || rests) {
             ControlFlow::Break(())
         } else {
             ControlFlow::Continue(())
         })
+    }
+
+    /// The logarithm at the top of one parabola about where the factor is, for logs of which it is hardly elsewhere: a parabola so narrow is
+    /// off by a thousandth. `None` if the filter loses the robot.
+    fn top_near(mut self, evidence: &Evidence<'_>, settings: &[Setting], base: f64) -> Option<f64> {
+        /// How far to either side it reaches, and how far its top is trusted, in units of that.
+        const NEAR: f64 = 0.06;
+        const TRUSTED: f64 = 2.0;
+        if !self.reaches(NEAR) {
+            return Some(self.middle);
+        }
+        let at = |log: f64| Some(self.at(evidence, settings, log)? - base);
+        let (low, high) = (at(self.middle - NEAR)?, at(self.middle + NEAR)?);
+        match top_of_parabola([low, self.gain, high]).filter(|steps| steps.abs() < TRUSTED) {
+            Some(steps) => Some(self.middle + steps * NEAR),
+            None => {
+                self.half = NEAR;
+                Some(self.best(evidence, settings, base)?.middle)
+            }
+        }
     }
 
     /// At its best.
@@ -315,16 +341,18 @@ pub(crate) fn factor_again(evidence: &Evidence<'_>, settings: &[Setting]) -> Opt
     let Pattern::Constant(values) = &noise.pattern else {
         return None;
     };
-    let base = evidence.likelihood(&others)?;
-    let mut factor = Factor {
-        spec: noise.spec,
-        gain: evidence.likelihood(settings)? - base,
+    let near = Factor {
         middle: values[0].ln(),
-        half: 0.08,
+        ..Factor::neutral(noise.spec)
     };
-    // One parabola: the best is near.
-    let _ = factor.round(evidence, &others, base)?;
-    Some((place, factor.middle.exp()))
+    let top = near.top_near(evidence, &others, evidence.likelihood(settings)?)?;
+    Some((place, top.exp()))
+}
+
+/// Where the top of a parabola through three numbers at equal steps is, in steps from the middle one; `None` if it has none.
+pub(super) fn top_of_parabola([low, middle, high]: [f64; 3]) -> Option<f64> {
+    let bend = high - 2.0 * middle + low;
+    (bend < 0.0).then(|| -0.5 * (high - low) / bend)
 }
 
 #[cfg(test)]
