@@ -156,6 +156,11 @@ impl<'w> Forecast<'w> {
         self.apparatus.effects.observed(&now, pose.position)
     }
 
+    /// Whether the camera sees every pose where it is, before its noise.
+    pub fn sees_plainly(&self) -> bool {
+        !self.apparatus.effects.has(Hook::Observed)
+    }
+
     /// Expected readings at a pose with this covariance, to second order in the distance.
     pub fn readings(&mut self, pose: Pose, covariance: &PoseMatrix) -> Outlook {
         let mut outlook = self.apparatus.outlook(pose, covariance);

@@ -47,6 +47,41 @@ pub(crate) struct Instant {
 }
 
 impl Instant {
+    /// Of which nothing is known.
+    fn unknown() -> Self {
+        let pose = Pose::new(0.0, 0.0, 0.0);
+        Self {
+            time_s: 0.0,
+            used: 0,
+            seen_from: pose,
+            seen: Vec2::ZERO,
+            sensed_from: pose,
+            covariance: [[0.0; 3]; 3],
+            uncut: [0.0; 8],
+            remembered: [0.0; 8],
+            expected: [0.0; 8],
+            deviation: [1.0; 8],
+            look: Look::default(),
+            innovation: [0.0; MEASURED],
+            per_scale: [1.0; MEASURED],
+            likelihood: Likelihood::ONE,
+            slope: [[0.0; 3]; MEASURED],
+            gain: [[0.0; 3]; MEASURED],
+            moved_from: pose,
+            command: WheelSpeeds::default(),
+            moved_to: pose,
+            turned: Vec2::ZERO,
+        }
+    }
+
+    /// Forgets the numbers that were measured: those of the next step may not be there.
+    fn forget(&mut self) {
+        (self.remembered, self.expected, self.deviation) = ([0.0; 8], [0.0; 8], [1.0; 8]);
+        (self.innovation, self.per_scale) = ([0.0; MEASURED], [1.0; MEASURED]);
+        (self.slope, self.gain) = ([[0.0; 3]; MEASURED], [[0.0; 3]; MEASURED]);
+        self.likelihood = Likelihood::ONE;
+    }
+
     /// Counts a number, if it does count, by its likelihood; by default that of its innovation.
     fn count(&mut self, m: usize, likelihood: Option<Likelihood>) {
         if self.used >> m & 1 == 1 {
@@ -140,14 +175,16 @@ impl State {
         let across: [f64; 3] =
             std::array::from_fn(|i| p[i][0] * slope[0] + p[i][1] * slope[1] + p[i][2] * slope[2]);
         let variance = slope[0] * across[0] + slope[1] * across[1] + slope[2] * across[2] + noise_variance;
-        let scale = 1.0 / variance.sqrt();
-        let gain = across.map(|a| a * (scale * scale));
+        // The next number waits for the gain, nothing for the scale.
+        let per_variance = 1.0 / variance;
+        let gain = across.map(|a| a * per_variance);
         for i in 0..3 {
             for j in 0..3 {
                 p[i][j] -= gain[i] * across[j];
             }
         }
         (0..3).for_each(|axis| self.moved[axis] += gain[axis] * innovation);
+        let scale = per_variance.sqrt();
         (innovation * scale, scale, gain)
     }
 
@@ -207,7 +244,9 @@ pub(crate) fn filter(
     step_counts: f64,
 ) -> Option<Trace> {
     let mut instants = Vec::with_capacity(rows.len());
-    let log_likelihood = filtered(world, rows, used, step_counts, |instant| instants.push(instant))?;
+    let log_likelihood = filtered(world, rows, used, step_counts, |instant| {
+        instants.push(instant.clone())
+    })?;
     Some(Trace {
         instants,
         log_likelihood,
@@ -226,27 +265,29 @@ fn filtered(
     rows: &[LogRow],
     used: Option<&[Used]>,
     step_counts: f64,
-    mut each: impl FnMut(Instant),
+    mut each: impl FnMut(&Instant),
 ) -> Option<f64> {
     let mut forecast = Forecast::new(world).ok()?;
     let (mut state, burn_in) = start(rows, &forecast.machine().robot, world.rules())?;
     state.memory = (forecast.kept() > 0.0).then(Memory::default);
     let mut log_likelihood = 0.0;
+    let mut instant = Instant::unknown();
     for (i, row) in rows.iter().enumerate() {
         forecast.tick(row.time_s);
         let usable = match used {
             Some(used) => used[i],
             None => available(row, i),
         };
-        let instant = step(
+        step(
             &mut forecast,
             &mut state,
             (row, step_counts),
             usable,
             i >= burn_in,
+            &mut instant,
         );
         log_likelihood += instant.likelihood.ln();
-        each(instant);
+        each(&instant);
         if !state.pose.position.x.is_finite() {
             return None;
         }
@@ -283,47 +324,26 @@ fn available(row: &LogRow, index: usize) -> Used {
         .fold(camera, |used, lane| used | 1 << (lane + 2))
 }
 
-/// One control step.
+/// One control step, which `instant` then tells.
 fn step(
     forecast: &mut Forecast<'_>,
     state: &mut State,
     (row, step_counts): (&LogRow, f64),
     usable: Used,
     counts: bool,
-) -> Instant {
-    let mut instant = Instant {
-        time_s: row.time_s,
-        used: if counts { usable } else { 0 },
-        seen_from: state.pose,
-        seen: forecast.observed(state.pose),
-        sensed_from: state.pose,
-        covariance: state.covariance,
-        uncut: [0.0; 8],
-        remembered: [0.0; 8],
-        expected: [0.0; 8],
-        deviation: [1.0; 8],
-        look: Look::default(),
-        innovation: [0.0; MEASURED],
-        per_scale: [1.0; MEASURED],
-        likelihood: Likelihood::ONE,
-        slope: [[0.0; 3]; MEASURED],
-        gain: [[0.0; 3]; MEASURED],
-        moved_from: state.pose,
-        command: row.command,
-        moved_to: state.pose,
-        turned: Vec2::ZERO,
-    };
-    see(forecast, state, row, usable, &mut instant);
+    instant: &mut Instant,
+) {
+    instant.forget();
+    instant.time_s = row.time_s;
+    instant.used = if counts { usable } else { 0 };
+    instant.seen_from = state.pose;
+    instant.seen = forecast.observed(state.pose);
+    instant.command = row.command;
+    see(forecast, state, row, usable, instant);
     instant.sensed_from = state.pose;
     instant.covariance = state.covariance;
     let outlook = forecast.readings(state.pose, &state.covariance);
-    sense(
-        forecast,
-        state,
-        (row, step_counts, &outlook),
-        usable,
-        &mut instant,
-    );
+    sense(forecast, state, (row, step_counts, &outlook), usable, instant);
     instant.moved_from = state.pose;
     let motion = forecast.motion(state.pose, row.command);
     let doubt = doubt(forecast, row);
@@ -342,7 +362,6 @@ fn step(
         memory: state.memory,
         ..State::new(motion.pose, covariance)
     };
-    instant
 }
 
 /// What a command that was not logged adds to the variance of x and y, m2, and of the heading, rad2.
@@ -374,6 +393,9 @@ fn see(forecast: &Forecast<'_>, state: &mut State, row: &LogRow, usable: Used, i
 /// Change of the seen position with the pose.
 fn camera_slopes(forecast: &Forecast<'_>, pose: Pose, seen: Vec2) -> [[f64; 3]; 2] {
     const H: f64 = 1e-5;
+    if forecast.sees_plainly() {
+        return [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+    }
     let mut slopes = [[0.0; 3]; 2];
     for axis in 0..3 {
         let mut moved = State::new(pose, [[0.0; 3]; 3]);

@@ -17,6 +17,7 @@ mod steps;
 mod channels;
 mod filter;
 mod moments;
+mod tail;
 
 // Which effects could explain it.
 mod catalogue;

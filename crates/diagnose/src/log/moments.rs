@@ -1,6 +1,6 @@
 //! A normal variable that is cut at zero and perhaps rounded before.
 
-use statrs::function::erf::erfc;
+use super::tail::Tail;
 
 /// Mean and variance of what becomes of X, and the change of that mean with X's.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -35,10 +35,8 @@ pub(crate) fn cut(mean: f64, deviation: f64, step: f64, declared: f64) -> Cut {
     let (open, density) = if z == 0.0 {
         (0.5, 1.0 / std::f64::consts::TAU.sqrt())
     } else {
-        (
-            0.5 * erfc(-z * std::f64::consts::FRAC_1_SQRT_2),
-            (-0.5 * z * z).exp() / std::f64::consts::TAU.sqrt(),
-        )
+        let Tail { beyond, density } = Tail::at(-z);
+        (beyond, density / std::f64::consts::TAU.sqrt())
     };
     let first = mean * open + deviation * density;
     let second = (mean * mean + deviation * deviation) * open + mean * deviation * density;
@@ -105,9 +103,8 @@ pub(crate) fn likelihood_of_cut(reading: f64, mean: f64, deviation: f64, step: f
             square: z * z,
         };
     }
-    let shut = 0.5 * erfc(z * std::f64::consts::FRAC_1_SQRT_2);
     Likelihood {
-        factor: shut * std::f64::consts::TAU.sqrt(),
+        factor: Tail::at(z).beyond * std::f64::consts::TAU.sqrt(),
         square: 0.0,
     }
 }
@@ -128,11 +125,11 @@ fn rounded(mean: f64, deviation: f64, step: f64, declared: f64) -> Cut {
     let (mut first, mut second, mut open) = (0.0, 0.0, 0.0);
     for k in sure + 1..=most {
         let z = ((k as f64 - 0.5) * step - mean) / deviation;
-        let reach = 0.5 * erfc(z * std::f64::consts::FRAC_1_SQRT_2);
-        first += reach;
+        let Tail { beyond, density } = Tail::at(z);
+        first += beyond;
         // About the multiple that is surely reached: k^2 - (k - 1)^2 of it.
-        second += (2.0 * (k - sure) as f64 - 1.0) * reach;
-        open += (-0.5 * z * z).exp();
+        second += (2.0 * (k - sure) as f64 - 1.0) * beyond;
+        open += density;
     }
     Cut {
         mean: step * (sure as f64 + first),
