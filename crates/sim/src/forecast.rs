@@ -152,6 +152,9 @@ impl<'w> Forecast<'w> {
 
     /// Where the camera sees a pose, before its noise, m.
     pub fn observed(&self, pose: Pose) -> Vec2 {
+        if self.sees_plainly() {
+            return pose.position;
+        }
         let now = Moment { pose, ..self.now };
         self.apparatus.effects.observed(&now, pose.position)
     }

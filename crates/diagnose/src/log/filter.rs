@@ -1,10 +1,12 @@
 //! An extended Kalman filter over the pose, driven by the logged commands, with the camera's positions and all eight
 //! readings as measurements, one number after the other.
 
-use sim::{Forecast, Look, Outlook, Pose, PoseMatrix, Robot, RunRules, Vec2, WheelSpeeds, World};
+use sim::{
+    Forecast, Look, Outlook, Pose, PoseMatrix, ReadingNoise, Robot, RunRules, Vec2, WheelSpeeds, World,
+};
 
 use super::evidence::SIGHT;
-use super::moments::{FINE, Likelihood, cut, likelihood_of_cut};
+use super::moments::{Cut, FINE, Likelihood, cut, likelihood_of_cut};
 use super::rows::{LogRow, start_pose};
 
 /// Numbers measured in a control step: camera x and y, then the eight readings.
@@ -165,11 +167,6 @@ impl State {
     /// and gain.
     #[inline]
     fn update(&mut self, missed: f64, slope: [f64; 3], noise_variance: f64) -> (f64, f64, [f64; 3]) {
-        if slope == [0.0; 3] {
-            // A sensor that sees no wall says nothing of the pose.
-            let scale = 1.0 / noise_variance.sqrt();
-            return (missed * scale, scale, slope);
-        }
         let innovation = missed - (0..3).map(|axis| slope[axis] * self.moved[axis]).sum::<f64>();
         let p = &mut self.covariance;
         let across: [f64; 3] =
@@ -267,28 +264,18 @@ fn filtered(
     step_counts: f64,
     mut each: impl FnMut(&Instant),
 ) -> Option<f64> {
-    let mut forecast = Forecast::new(world).ok()?;
-    let (mut state, burn_in) = start(rows, &forecast.machine().robot, world.rules())?;
-    state.memory = (forecast.kept() > 0.0).then(Memory::default);
+    let (mut filter, burn_in) = Filter::new(world, rows, step_counts)?;
     let mut log_likelihood = 0.0;
     let mut instant = Instant::unknown();
     for (i, row) in rows.iter().enumerate() {
-        forecast.tick(row.time_s);
         let usable = match used {
             Some(used) => used[i],
             None => available(row, i),
         };
-        step(
-            &mut forecast,
-            &mut state,
-            (row, step_counts),
-            usable,
-            i >= burn_in,
-            &mut instant,
-        );
+        filter.step(row, usable, i >= burn_in, &mut instant);
         log_likelihood += instant.likelihood.ln();
         each(&instant);
-        if !state.pose.position.x.is_finite() {
+        if !filter.state.pose.position.x.is_finite() {
             return None;
         }
     }
@@ -324,70 +311,199 @@ fn available(row: &LogRow, index: usize) -> Used {
         .fold(camera, |used, lane| used | 1 << (lane + 2))
 }
 
-/// One control step, which `instant` then tells.
-fn step(
-    forecast: &mut Forecast<'_>,
-    state: &mut State,
-    (row, step_counts): (&LogRow, f64),
-    usable: Used,
-    counts: bool,
-    instant: &mut Instant,
-) {
-    instant.forget();
-    instant.time_s = row.time_s;
-    instant.used = if counts { usable } else { 0 };
-    instant.seen_from = state.pose;
-    instant.seen = forecast.observed(state.pose);
-    instant.command = row.command;
-    see(forecast, state, row, usable, instant);
-    instant.sensed_from = state.pose;
-    instant.covariance = state.covariance;
-    let outlook = forecast.readings(state.pose, &state.covariance);
-    sense(forecast, state, (row, step_counts, &outlook), usable, instant);
-    instant.moved_from = state.pose;
-    let motion = forecast.motion(state.pose, row.command);
-    let doubt = doubt(forecast, row);
-    let mut covariance = carried(&state.covariance, motion.turned);
-    for i in 0..3 {
-        for j in 0..3 {
-            covariance[i][j] += motion.covariance[i][j];
+/// A filter on its way through a stretch.
+struct Filter<'w> {
+    forecast: Forecast<'w>,
+    state: State,
+    /// Step that the readings are rounded to.
+    step_counts: f64,
+    unseen: Unseen,
+}
+
+/// A reading of a sensor that sees no wall, which most do not: it says nothing of the pose.
+struct Unseen {
+    noise: ReadingNoise,
+    deviation: f64,
+    read: Cut,
+    /// One over the standard deviation of what is read.
+    scale: f64,
+    /// Of a reading of 0.
+    zero: Likelihood,
+}
+
+impl Unseen {
+    fn new(forecast: &Forecast<'_>, step_counts: f64) -> Self {
+        let noise = forecast.machine().noise;
+        let deviation = noise.deviation(0.0);
+        let declared = forecast.declared_noise().deviation(0.0);
+        let read = cut(0.0, deviation, step_counts, declared);
+        Self {
+            noise,
+            deviation,
+            read,
+            scale: 1.0 / read.variance.sqrt(),
+            zero: likelihood_of_cut(0.0, 0.0, deviation, step_counts),
         }
-        covariance[i][i] += doubt[i];
     }
-    (instant.moved_to, instant.turned) = (motion.pose, motion.turned);
-    if let Some(memory) = &mut state.memory {
-        memory.carry(motion.turned);
-    }
-    *state = State {
-        memory: state.memory,
-        ..State::new(motion.pose, covariance)
-    };
 }
 
-/// What a command that was not logged adds to the variance of x and y, m2, and of the heading, rad2.
-fn doubt(forecast: &Forecast<'_>, row: &LogRow) -> [f64; 3] {
-    let way_m2 = row.doubt_m * row.doubt_m;
-    let turn = 2.0 * way_m2 / forecast.machine().robot.axle_m.powi(2);
-    [way_m2, way_m2, turn]
-}
-
-/// The camera's position.
-fn see(forecast: &Forecast<'_>, state: &mut State, row: &LogRow, usable: Used, instant: &mut Instant) {
-    let Some(observed) = row.observed.filter(|_| usable & 0b11 != 0) else {
-        return;
-    };
-    // Positions are written to 0.1 mm.
-    const ROUNDING_M2: f64 = 1e-8 / 12.0;
-    let noise = forecast.machine().camera_noise_m.powi(2) + ROUNDING_M2;
-    let slopes = camera_slopes(forecast, instant.seen_from, instant.seen);
-    let missed = observed - instant.seen;
-    for (m, missed) in [missed.x, missed.y].into_iter().enumerate() {
-        instant.slope[m] = slopes[m];
-        (instant.innovation[m], instant.per_scale[m], instant.gain[m]) =
-            state.update(missed, slopes[m], noise);
-        instant.count(m, None);
+impl<'w> Filter<'w> {
+    /// At the first of these rows, and the number of rows that do not count.
+    fn new(world: &'w World<'w>, rows: &[LogRow], step_counts: f64) -> Option<(Self, usize)> {
+        let forecast = Forecast::new(world).ok()?;
+        let (mut state, burn_in) = start(rows, &forecast.machine().robot, world.rules())?;
+        state.memory = (forecast.kept() > 0.0).then(Memory::default);
+        let filter = Self {
+            unseen: Unseen::new(&forecast, step_counts),
+            forecast,
+            state,
+            step_counts,
+        };
+        Some((filter, burn_in))
     }
-    state.settle();
+
+    /// One control step, which `instant` then tells.
+    fn step(&mut self, row: &LogRow, usable: Used, counts: bool, instant: &mut Instant) {
+        self.forecast.tick(row.time_s);
+        instant.forget();
+        instant.time_s = row.time_s;
+        instant.used = if counts { usable } else { 0 };
+        instant.seen_from = self.state.pose;
+        instant.seen = self.forecast.observed(self.state.pose);
+        instant.command = row.command;
+        self.see(row, usable, instant);
+        instant.sensed_from = self.state.pose;
+        instant.covariance = self.state.covariance;
+        let outlook = self.forecast.readings(self.state.pose, &self.state.covariance);
+        self.sense(row, &outlook, usable, instant);
+        instant.moved_from = self.state.pose;
+        self.drive(row, instant);
+    }
+
+    /// The camera's position.
+    fn see(&mut self, row: &LogRow, usable: Used, instant: &mut Instant) {
+        let Some(observed) = row.observed.filter(|_| usable & 0b11 != 0) else {
+            return;
+        };
+        // Positions are written to 0.1 mm.
+        const ROUNDING_M2: f64 = 1e-8 / 12.0;
+        let noise = self.forecast.machine().camera_noise_m.powi(2) + ROUNDING_M2;
+        let slopes = camera_slopes(&self.forecast, instant.seen_from, instant.seen);
+        let missed = observed - instant.seen;
+        for (m, missed) in [missed.x, missed.y].into_iter().enumerate() {
+            instant.slope[m] = slopes[m];
+            (instant.innovation[m], instant.per_scale[m], instant.gain[m]) =
+                self.state.update(missed, slopes[m], noise);
+            instant.count(m, None);
+        }
+        self.state.settle();
+    }
+
+    /// The eight readings.
+    fn sense(&mut self, row: &LogRow, outlook: &Outlook, usable: Used, instant: &mut Instant) {
+        (instant.look, instant.uncut) = (outlook.look, outlook.mean);
+        let noise = self.forecast.machine().noise;
+        if self.unseen.noise != noise {
+            self.unseen = Unseen::new(&self.forecast, self.step_counts);
+        }
+        let mut slopes = outlook.slope;
+        if let Some(memory) = &mut self.state.memory {
+            memory.follow(self.forecast.kept(), &mut slopes);
+            instant.remembered = memory.missed;
+        }
+        for (lane, slope) in slopes.into_iter().enumerate() {
+            let (m, reading) = (lane + 2, row.readings[lane]);
+            let is_usable = usable >> m & 1 == 1;
+            let mean = outlook.mean[lane] + instant.remembered[lane];
+            if mean == 0.0 && slope == [0.0; 3] && outlook.edge_variance[lane] == 0.0 {
+                self.sense_nothing(m, Some(reading).filter(|_| is_usable), instant);
+                continue;
+            }
+            let p = &self.state.covariance;
+            // The variance before the cut holds the pose's share at this moment of the sequence.
+            let pose_variance: f64 = (0..3)
+                .map(|i| slope[i] * (p[i][0] * slope[0] + p[i][1] * slope[1] + p[i][2] * slope[2]))
+                .sum();
+            let own_variance = noise.deviation(mean).powi(2) + outlook.edge_variance[lane];
+            let deviation = (own_variance + pose_variance).sqrt();
+            if deviation < EXACT_COUNTS {
+                instant.used &= !(1 << m);
+                continue;
+            }
+            let declared = self.forecast.declared_noise().deviation(mean);
+            let read = cut(mean, deviation, self.step_counts, declared);
+            (instant.expected[lane], instant.deviation[lane]) = (read.mean, deviation);
+            if !is_usable {
+                continue;
+            }
+            // The likelihood of what may be cut, by all that is known before.
+            let cut_likelihood = (self.is_fine(deviation) && read.open < 1.0).then(|| {
+                let moved: f64 = (0..3).map(|axis| slope[axis] * self.state.moved[axis]).sum();
+                likelihood_of_cut(reading, mean + moved, deviation, self.step_counts)
+            });
+            let slope = slope.map(|s| s * read.open);
+            let rest = (read.variance - pose_variance * read.open * read.open).max(1e-3 * read.variance);
+            instant.slope[m] = slope;
+            (instant.innovation[m], instant.per_scale[m], instant.gain[m]) =
+                self.state.update(reading - read.mean, slope, rest);
+            instant.count(m, cut_likelihood);
+        }
+        self.state.settle();
+    }
+
+    /// The reading of a sensor that sees no wall, if it is usable.
+    fn sense_nothing(&self, m: usize, reading: Option<f64>, instant: &mut Instant) {
+        let unseen = &self.unseen;
+        if unseen.deviation < EXACT_COUNTS {
+            instant.used &= !(1 << m);
+            return;
+        }
+        (instant.expected[m - 2], instant.deviation[m - 2]) = (unseen.read.mean, unseen.deviation);
+        let Some(reading) = reading else { return };
+        instant.per_scale[m] = unseen.scale;
+        instant.innovation[m] = (reading - unseen.read.mean) * unseen.scale;
+        let likelihood = self.is_fine(unseen.deviation).then(|| {
+            if reading > 0.0 {
+                likelihood_of_cut(reading, 0.0, unseen.deviation, self.step_counts)
+            } else {
+                unseen.zero
+            }
+        });
+        instant.count(m, likelihood);
+    }
+
+    /// Whether rounding is as good as noise of this standard deviation.
+    fn is_fine(&self, deviation: f64) -> bool {
+        self.step_counts < FINE * deviation
+    }
+
+    /// The command.
+    fn drive(&mut self, row: &LogRow, instant: &mut Instant) {
+        let motion = self.forecast.motion(self.state.pose, row.command);
+        let doubt = self.doubt(row);
+        let mut covariance = carried(&self.state.covariance, motion.turned);
+        for i in 0..3 {
+            for j in 0..3 {
+                covariance[i][j] += motion.covariance[i][j];
+            }
+            covariance[i][i] += doubt[i];
+        }
+        (instant.moved_to, instant.turned) = (motion.pose, motion.turned);
+        if let Some(memory) = &mut self.state.memory {
+            memory.carry(motion.turned);
+        }
+        self.state = State {
+            memory: self.state.memory,
+            ..State::new(motion.pose, covariance)
+        };
+    }
+
+    /// What a command that was not logged adds to the variance of x and y, m2, and of the heading, rad2.
+    fn doubt(&self, row: &LogRow) -> [f64; 3] {
+        let way_m2 = row.doubt_m * row.doubt_m;
+        let turn = 2.0 * way_m2 / self.forecast.machine().robot.axle_m.powi(2);
+        [way_m2, way_m2, turn]
+    }
 }
 
 /// Change of the seen position with the pose.
@@ -406,61 +522,6 @@ fn camera_slopes(forecast: &Forecast<'_>, pose: Pose, seen: Vec2) -> [[f64; 3]; 
         (slopes[0][axis], slopes[1][axis]) = (change.x, change.y);
     }
     slopes
-}
-
-/// The eight readings.
-fn sense(
-    forecast: &Forecast<'_>,
-    state: &mut State,
-    (row, step_counts, outlook): (&LogRow, f64, &Outlook),
-    usable: Used,
-    instant: &mut Instant,
-) {
-    (instant.look, instant.uncut) = (outlook.look, outlook.mean);
-    let noise = forecast.machine().noise;
-    let mut slopes = outlook.slope;
-    if let Some(memory) = &mut state.memory {
-        memory.follow(forecast.kept(), &mut slopes);
-        instant.remembered = memory.missed;
-    }
-    for (lane, slope) in slopes.into_iter().enumerate() {
-        let m = lane + 2;
-        let mean = outlook.mean[lane] + instant.remembered[lane];
-        let p = &state.covariance;
-        // The variance before the cut holds the pose's share at this moment of the sequence.
-        let pose_variance: f64 = (0..3)
-            .map(|i| slope[i] * (p[i][0] * slope[0] + p[i][1] * slope[1] + p[i][2] * slope[2]))
-            .sum();
-        let own_variance = noise.deviation(mean).powi(2) + outlook.edge_variance[lane];
-        let deviation = (own_variance + pose_variance).sqrt();
-        if deviation < EXACT_COUNTS {
-            instant.used &= !(1 << m);
-            continue;
-        }
-        let read = cut(
-            mean,
-            deviation,
-            step_counts,
-            forecast.declared_noise().deviation(mean),
-        );
-        (instant.expected[lane], instant.deviation[lane]) = (read.mean, deviation);
-        if usable >> m & 1 == 0 {
-            continue;
-        }
-        // The likelihood of what may be cut, by all that is known before.
-        let fine = step_counts < FINE * deviation;
-        let cut_likelihood = (fine && read.open < 1.0).then(|| {
-            let moved: f64 = (0..3).map(|axis| slope[axis] * state.moved[axis]).sum();
-            likelihood_of_cut(row.readings[lane], mean + moved, deviation, step_counts)
-        });
-        let slope = slope.map(|s| s * read.open);
-        let rest = (read.variance - pose_variance * read.open * read.open).max(1e-3 * read.variance);
-        instant.slope[m] = slope;
-        (instant.innovation[m], instant.per_scale[m], instant.gain[m]) =
-            state.update(row.readings[lane] - read.mean, slope, rest);
-        instant.count(m, cut_likelihood);
-    }
-    state.settle();
 }
 
 /// Which readings the poses of a trace let count: those whose ray is neither near the end of the range nor near the
