@@ -21,27 +21,43 @@ pub(super) const NO_CHANGES: Changes = [[0.0; ABREAST]; MEASURED];
 /// Another model than that of a trace, which differs from it in one stage.
 pub(super) type Other<'w> = (Forecast<'w>, Stage);
 
-/// The normal equations of a column for each of the other models of a lot, lot by lot: of the change of each whitened innovation between
-/// the model of the trace and these, to first order. The other models are asked at the poses of the trace.
-///
-/// A trace is long: it is gone through once for all lots.
-pub(super) fn normals(lots: Vec<(Vec<Other<'_>>, Products)>, trace: &Trace) -> Vec<Normal> {
-    let mut lots: Vec<(Vec<Others<'_>>, Sums)> = (lots.into_iter())
-        .map(|(lot, wanted)| {
+/// Columns of other models, lot by lot, while the model of a trace goes through it: of the change of each whitened innovation between that
+/// model and these, to first order. The other models are asked at the poses of the trace.
+pub(super) struct Columns<'w>(Vec<(Vec<Others<'w>>, Sums)>);
+
+impl<'w> Columns<'w> {
+    pub(super) fn new(lots: Vec<(Vec<Other<'w>>, Products)>) -> Self {
+        let begun = |(lot, wanted): (Vec<Other<'w>>, Products)| {
             let sums = Sums::new(lot.len(), wanted);
             (abreast(lot), sums)
-        })
-        .collect();
-    for instant in &trace.instants {
-        for (others, sums) in &mut lots {
+        };
+        Self(lots.into_iter().map(begun).collect())
+    }
+
+    /// The next control step.
+    pub(super) fn add(&mut self, instant: &Instant, step_counts: f64) {
+        for (others, sums) in &mut self.0 {
             others
                 .iter_mut()
-                .for_each(|others| others.step(instant, trace.step_counts));
+                .for_each(|others| others.step(instant, step_counts));
             let changes = others.iter().map(|others| &others.changes);
             sums.add(instant.time_s, &instant.innovation, changes);
         }
     }
-    lots.into_iter().map(|(_, sums)| sums.into()).collect()
+
+    /// The normal equations of each lot.
+    pub(super) fn normals(self) -> impl Iterator<Item = Normal> + use<'w> {
+        self.0.into_iter().map(|(_, sums)| sums.into())
+    }
+}
+
+/// The normal equations of the columns of other models, lot by lot. A trace is long: it is gone through once for all lots.
+pub(super) fn normals(lots: Vec<(Vec<Other<'_>>, Products)>, trace: &Trace) -> Vec<Normal> {
+    let mut columns = Columns::new(lots);
+    for instant in &trace.instants {
+        columns.add(instant, trace.step_counts);
+    }
+    columns.normals().collect()
 }
 
 /// The normal equations of the columns of other models, all with each other.

@@ -7,9 +7,11 @@ use sim::{Forecast, Model, Pattern, Scene, Setting, World};
 use track::Side;
 
 use super::catalogue::{Variant, slow_speeds, variants};
-use super::columns::normal;
-use super::filter::{Trace, Used, clear_readings, filter, leads_elsewhere, likelihood, reaches_elsewhere};
-use super::normal::Normal;
+use super::columns::Columns;
+use super::filter::{
+    Trace, Used, clear_readings, filter, filtered, leads_elsewhere, likelihood, reaches_elsewhere,
+};
+use super::normal::{Normal, Products};
 use super::rows::{LogRow, stretches};
 use super::steps::WHOLE;
 use crate::Error;
@@ -341,14 +343,8 @@ impl<'a> Evidence<'a> {
     }
 
     fn assessed_anew(&self, settings: &[Setting], knobs: &[Knob]) -> Option<Assessment> {
-        let parts: Option<Vec<(f64, Normal)>> = self
-            .stretches
-            .par_iter()
-            .map(|stretch| {
-                let (world, trace) = self.trace(stretch, settings)?;
-                let normal = self.derivatives(&world, &trace, settings, knobs)?;
-                Some((trace.log_likelihood, normal))
-            })
+        let parts: Option<Vec<(f64, Normal)>> = (self.stretches.par_iter())
+            .map(|stretch| self.with_derivatives(stretch, settings, knobs))
             .collect();
         let (log_likelihood, normals) = parts?.into_iter().unzip();
         Some(Assessment {
@@ -357,16 +353,17 @@ impl<'a> Evidence<'a> {
         })
     }
 
-    /// The normal equations of the changes of the whitened innovations for one step of each knob, from the side with more of its range.
-    fn derivatives(
+    /// The log-likelihood of a stretch, and the normal equations of the changes of its whitened innovations for one step of each knob,
+    /// from the side with more of its range.
+    fn with_derivatives(
         &self,
-        world: &World<'a>,
-        trace: &Trace,
+        stretch: &Stretch<'_>,
         settings: &[Setting],
         knobs: &[Knob],
-    ) -> Option<Normal> {
+    ) -> Option<(f64, Normal)> {
         /// A step but for its rounding.
         const WHOLE: f64 = 0.999;
+        let world = self.world(settings, stretch.run).ok()?;
         let count = knobs.len();
         let turned = |knob: &Knob| {
             let [up, down] = [1.0, -1.0].map(|multiple| {
@@ -386,7 +383,7 @@ impl<'a> Evidence<'a> {
             .collect::<Option<_>>()?;
         let others = (worlds.iter().zip(knobs))
             .map(|(other, knob)| {
-                let forecast = Forecast::compared(other, world).ok()?;
+                let forecast = Forecast::compared(other, &world).ok()?;
                 Some((forecast, stage_of(&settings[knob.setting])))
             })
             .collect::<Option<Vec<_>>>()?;
@@ -394,8 +391,14 @@ impl<'a> Evidence<'a> {
         let places: Vec<(usize, f64)> = (own.into_iter().zip(&sides))
             .map(|(place, (steps, _))| (place, whole(*steps)))
             .collect();
+        let mut columns = Columns::new(vec![(others, Products::All)]);
+        let steps = self.step_counts;
+        let log_likelihood = filtered(&world, stretch.rows, Some(&stretch.used), steps, |instant| {
+            columns.add(instant, steps);
+        })?;
+        let normal = columns.normals().next()?;
         // What another run's value changes here: nothing.
-        Some(normal(others, trace).among(count, &places))
+        Some((log_likelihood, normal.among(count, &places)))
     }
 }
 

@@ -257,7 +257,7 @@ pub(crate) fn likelihood(world: &World<'_>, rows: &[LogRow], used: &[Used], step
 }
 
 /// Filters one stretch and gives each control step to `each`; the log-likelihood.
-fn filtered(
+pub(super) fn filtered(
     world: &World<'_>,
     rows: &[LogRow],
     used: Option<&[Used]>,

@@ -155,8 +155,9 @@ impl Sums {
             match self.wanted {
                 Products::Squares => self.add_row((a, 0), |m, k| own[m][k] * own[m][k], time_s),
                 Products::All => {
+                    let rows = ABREAST.min(self.count - a * ABREAST);
                     for (b, other) in columns.clone().take(others).enumerate() {
-                        for i in 0..ABREAST {
+                        for i in 0..rows {
                             self.add_row((block + b, i), |m, k| own[m][i] * other[m][k], time_s);
                         }
                     }
