@@ -1,7 +1,7 @@
 //! Effects on noise: judged by the log-likelihood alone, after everything that has a mean.
 
 use std::collections::BTreeMap;
-use std::ops::{ControlFlow, Range};
+use std::ops::ControlFlow;
 
 use rayon::prelude::*;
 use sim::{Pattern, Setting, Spec, find};
@@ -11,7 +11,7 @@ use statrs::statistics::Statistics;
 use super::evidence::Evidence;
 use super::leads::{By, tail};
 use super::refined::Refined;
-use super::repeat::{REPEATS, some_repeats};
+use super::repeat::{REPEATS, p_in_repeats};
 use crate::detectable::{Detectable, QUANTILE_95};
 use crate::slip::memory_of;
 
@@ -66,7 +66,6 @@ pub(crate) fn by_chance(noise: &[Factor]) -> f64 {
 /// robots as declared the slip level is found 2 to 4 % low, with a stated error of 0.5 %. A gain that this could make is
 /// compared with those in simulated logs (Student's t), and so is one of `faults` or less; one whose p is `level` or more by the
 /// likelihood stays as it is. Readings in coarse steps are no normal numbers: no gain is beyond their faults.
-/// Half of the logs are enough where these make plain chance of it, or plainly none.
 pub(crate) fn p_among_repeats(
     evidence: &Evidence<'_>,
     settings: &[Setting],
@@ -76,12 +75,6 @@ pub(crate) fn p_among_repeats(
 ) -> f64 {
     /// Log-likelihood that no fault of the filter gains.
     const SURE: f64 = 50.0;
-    /// The logs that are simulated first and those that follow.
-    const FIRST: Range<u64> = 0..REPEATS / 2;
-    const OTHERS: Range<u64> = REPEATS / 2..REPEATS;
-    /// Probability that the first alone make of what is plainly chance, and share of the level that they make of what plainly is not.
-    const CHANCE: f64 = 0.5;
-    const NO_CHANCE: f64 = 0.1;
     let of_factor = |factor: &Factor| {
         let p = factor.p();
         if p >= level || factor.gain > faults.max(SURE) && !evidence.is_coarse() {
@@ -93,13 +86,7 @@ pub(crate) fn p_among_repeats(
         };
         let among =
             |logs: &[f64]| p_among(factor.middle, logs).map_or(p, |among| p.max(FACTORS * among).min(1.0));
-        let mut logs = some_repeats(evidence, settings, FIRST, of_log);
-        let first = among(&logs);
-        if first > CHANCE || first < NO_CHANCE * level {
-            return first;
-        }
-        logs.extend(some_repeats(evidence, settings, OTHERS, of_log));
-        among(&logs)
+        p_in_repeats(evidence, settings, level, of_log, among)
     };
     noise.iter().map(of_factor).fold(1.0, f64::min)
 }

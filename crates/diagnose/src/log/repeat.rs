@@ -21,8 +21,32 @@ pub(crate) fn repeats<R: Send>(
     some_repeats(evidence, settings, 0..REPEATS, of)
 }
 
-/// The same of some of these logs, by their numbers.
-pub(crate) fn some_repeats<R: Send>(
+/// The probability that `judged` gives to what `of_log` makes of each simulated log. Half of the logs are enough where these make plain
+/// chance of it, or plainly none where an alarm has a probability of `level`.
+pub(super) fn p_in_repeats(
+    evidence: &Evidence<'_>,
+    settings: &[Setting],
+    level: f64,
+    of_log: impl Fn(&Evidence<'_>) -> Option<f64> + Sync,
+    judged: impl Fn(&[f64]) -> f64,
+) -> f64 {
+    /// The logs that are simulated first and those that follow.
+    const FIRST: Range<u64> = 0..REPEATS / 2;
+    const OTHERS: Range<u64> = REPEATS / 2..REPEATS;
+    /// Probability of plain chance, and share of the level of what plainly is none.
+    const CHANCE: f64 = 0.5;
+    const NO_CHANCE: f64 = 0.1;
+    let mut logs = some_repeats(evidence, settings, FIRST, &of_log);
+    let first = judged(&logs);
+    if first > CHANCE || first < NO_CHANCE * level {
+        return first;
+    }
+    logs.extend(some_repeats(evidence, settings, OTHERS, &of_log));
+    judged(&logs)
+}
+
+/// The same as [`repeats`] of some of these logs, by their numbers.
+fn some_repeats<R: Send>(
     evidence: &Evidence<'_>,
     settings: &[Setting],
     numbers: Range<u64>,

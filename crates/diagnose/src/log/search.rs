@@ -15,7 +15,7 @@ use super::noise::{Factor, by_chance, detectable_noises, noises, p_among, p_amon
 use super::pairs::Pair;
 use super::refine::jumps;
 use super::refined::{Refined, pursue};
-use super::repeat::repeats;
+use super::repeat::{p_in_repeats, repeats};
 use super::screen::normals;
 use super::unnamed::Unnamed;
 use crate::candidate::label;
@@ -164,6 +164,7 @@ impl<'a> Search<'a> {
             return None;
         }
         let list = self.promising(shortlist(&leads, &self.variants, PROMISING));
+        let list = self.once_if_they_jump(list);
         self.found = self.pursued(&list);
         self.sort();
         self.accept_noise(noise, &list);
@@ -181,10 +182,10 @@ impl<'a> Search<'a> {
             return p;
         }
         let best = self.variants_of(&shortlist(leads, &self.variants, PROMISING));
-        let logs = repeats(&self.evidence, &[], |repeated| {
-            Some(most_left(repeated, &[], &best)?.max(LEAST).ln())
-        });
-        p_among(most(leads).max(LEAST).ln(), &logs).map_or(p, |among| p.max(among))
+        let of_log = |repeated: &Evidence<'_>| Some(most_left(repeated, &[], &best)?.max(LEAST).ln());
+        let own = most(leads).max(LEAST).ln();
+        let among = |logs: &[f64]| p_among(own, logs).map_or(p, |among| p.max(among));
+        p_in_repeats(&self.evidence, &[], ALARM, of_log, among)
     }
 
     /// The leads refined: a few steps each, then to the end those that may still be the best.
@@ -236,6 +237,21 @@ impl<'a> Search<'a> {
             .filter(keeps)
             .map(|(lead, _)| lead)
             .collect()
+    }
+
+    /// The leads but for those to a further constant size of an effect that jumps: a hunt tries the others.
+    fn once_if_they_jump(&self, list: Vec<Lead>) -> Vec<Lead> {
+        let mut kept: Vec<Lead> = Vec::new();
+        for lead in list {
+            let setting = lead.start(&self.variants[lead.variant]);
+            let is_same =
+                |other: &Lead| other.by == By::Constant && self.variants[other.variant].spec == setting.spec;
+            let again = lead.by == By::Constant && jumps(&setting) && kept.iter().any(is_same);
+            if !again {
+                kept.push(lead);
+            }
+        }
+        kept
     }
 
     pub(super) fn variants_of(&self, leads: &[Lead]) -> Vec<Variant> {
