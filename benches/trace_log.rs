@@ -1,4 +1,4 @@
-//! What a robot's log lacks, of four runs of five laps: of a robot as declared, with one effect, and with two.
+//! What a robot's log lacks, of four runs of five laps: of a robot as declared, and with one, two and three effects.
 
 mod ground;
 
@@ -15,12 +15,20 @@ const LAPS: usize = 5;
 
 fn main() {
     let mut criterion = Criterion::default().configure_from_args();
-    let robots: [(&str, Effects); 3] = [
+    let robots: [(&str, Effects); 4] = [
         ("as-declared", &[]),
         ("one-effect", &[("wheel-asymmetry", &[1.02])]),
         (
             "two-effects",
             &[("reading-gain", &[0.88]), ("marker-offset", &[-0.009, 0.0, 0.0])],
+        ),
+        (
+            "three-effects",
+            &[
+                ("wheel-scale", &[1.05]),
+                ("distance-scale", &[0.93]),
+                ("slip-level", &[2.0]),
+            ],
         ),
     ];
     let declared = model(braitenberg(), 0.005);

@@ -86,7 +86,7 @@ pub(crate) fn p_among_repeats(
         };
         let among =
             |logs: &[f64]| p_among(factor.middle, logs).map_or(p, |among| p.max(FACTORS * among).min(1.0));
-        p_in_repeats(evidence, settings, level, of_log, among)
+        p_in_repeats(evidence, settings, of_log, among)
     };
     noise.iter().map(of_factor).fold(1.0, f64::min)
 }

@@ -22,23 +22,21 @@ pub(crate) fn repeats<R: Send>(
 }
 
 /// The probability that `judged` gives to what `of_log` makes of each simulated log. Half of the logs are enough where these make plain
-/// chance of it, or plainly none where an alarm has a probability of `level`.
+/// chance of it; four that make plainly none of it may do so by chance.
 pub(super) fn p_in_repeats(
     evidence: &Evidence<'_>,
     settings: &[Setting],
-    level: f64,
     of_log: impl Fn(&Evidence<'_>) -> Option<f64> + Sync,
     judged: impl Fn(&[f64]) -> f64,
 ) -> f64 {
     /// The logs that are simulated first and those that follow.
     const FIRST: Range<u64> = 0..REPEATS / 2;
     const OTHERS: Range<u64> = REPEATS / 2..REPEATS;
-    /// Probability of plain chance, and share of the level of what plainly is none.
+    /// Probability of plain chance.
     const CHANCE: f64 = 0.5;
-    const NO_CHANCE: f64 = 0.1;
     let mut logs = some_repeats(evidence, settings, FIRST, &of_log);
     let first = judged(&logs);
-    if first > CHANCE || first < NO_CHANCE * level {
+    if first > CHANCE {
         return first;
     }
     logs.extend(some_repeats(evidence, settings, OTHERS, &of_log));

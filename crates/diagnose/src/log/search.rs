@@ -185,7 +185,7 @@ impl<'a> Search<'a> {
         let of_log = |repeated: &Evidence<'_>| Some(most_left(repeated, &[], &best)?.max(LEAST).ln());
         let own = most(leads).max(LEAST).ln();
         let among = |logs: &[f64]| p_among(own, logs).map_or(p, |among| p.max(among));
-        p_in_repeats(&self.evidence, &[], ALARM, of_log, among)
+        p_in_repeats(&self.evidence, &[], of_log, among)
     }
 
     /// The leads refined: a few steps each, then to the end those that may still be the best.
