@@ -75,6 +75,8 @@ pub(crate) fn p_among_repeats(
 ) -> f64 {
     /// Log-likelihood that no fault of the filter gains.
     const SURE: f64 = 50.0;
+    /// How far to either side the first parabola of a simulated log reaches.
+    const NEAR: f64 = 0.06;
     let of_factor = |factor: &Factor| {
         let p = factor.p();
         if p >= level || factor.gain > faults.max(SURE) && !evidence.is_coarse() {
@@ -82,7 +84,12 @@ pub(crate) fn p_among_repeats(
         }
         let of_log = |repeated: &Evidence<'_>| {
             let base = repeated.likelihood(settings)?;
-            Factor::neutral(factor.spec).top_near(repeated, settings, base)
+            // Found as the measured one is: what is best on a rough likelihood is nearer to 1 than the top of a smooth one.
+            let near = Factor {
+                half: NEAR,
+                ..Factor::neutral(factor.spec)
+            };
+            Some(near.best(repeated, settings, base)?.middle)
         };
         let among =
             |logs: &[f64]| p_among(factor.middle, logs).map_or(p, |among| p.max(FACTORS * among).min(1.0));
@@ -230,24 +237,17 @@ impl Factor {
         })
     }
 
-    /// The logarithm at the top of one parabola about where the factor is, for logs of which it is hardly elsewhere: a parabola so narrow is
-    /// off by a thousandth. `None` if the filter loses the robot.
-    fn top_near(mut self, evidence: &Evidence<'_>, settings: &[Setting], base: f64) -> Option<f64> {
-        /// How far to either side it reaches, and how far its top is trusted, in units of that.
-        const NEAR: f64 = 0.06;
+    /// The logarithm at the top of the next parabola, if that is near; outer `None` if the filter loses the robot.
+    fn top(&self, evidence: &Evidence<'_>, settings: &[Setting], base: f64) -> Option<Option<f64>> {
+        /// How far off it is trusted, in units of how far the parabola reaches.
         const TRUSTED: f64 = 2.0;
-        if !self.reaches(NEAR) {
-            return Some(self.middle);
+        if !self.reaches(self.half) {
+            return Some(None);
         }
         let at = |log: f64| Some(self.at(evidence, settings, log)? - base);
-        let (low, high) = (at(self.middle - NEAR)?, at(self.middle + NEAR)?);
-        match top_of_parabola([low, self.gain, high]).filter(|steps| steps.abs() < TRUSTED) {
-            Some(steps) => Some(self.middle + steps * NEAR),
-            None => {
-                self.half = NEAR;
-                Some(self.best(evidence, settings, base)?.middle)
-            }
-        }
+        let (low, high) = (at(self.middle - self.half)?, at(self.middle + self.half)?);
+        let top = top_of_parabola([low, self.gain, high]).filter(|steps| steps.abs() < TRUSTED);
+        Some(top.map(|steps| self.middle + steps * self.half))
     }
 
     /// At its best.
@@ -320,20 +320,28 @@ pub(crate) fn is_noise(setting: &Setting) -> bool {
     NOISES.contains(&setting.spec.name)
 }
 
-/// The place of the noise effect among settings, if there is one, with its factor fitted to other logs from where it is.
+/// The place of the noise effect among settings, if there is one, with its factor fitted to other logs by one parabola: it is near.
 pub(crate) fn factor_again(evidence: &Evidence<'_>, settings: &[Setting]) -> Option<(usize, f64)> {
+    /// How far to either side the parabola reaches: it is off by a thousandth then.
+    const NEAR: f64 = 0.06;
     let place = settings.iter().position(is_noise)?;
     let mut others = settings.to_vec();
     let noise = others.remove(place);
     let Pattern::Constant(values) = &noise.pattern else {
         return None;
     };
-    let near = Factor {
+    let mut factor = Factor {
         middle: values[0].ln(),
+        half: NEAR,
         ..Factor::neutral(noise.spec)
     };
-    let top = near.top_near(evidence, &others, evidence.likelihood(settings)?)?;
-    Some((place, top.exp()))
+    let base = evidence.likelihood(settings)?;
+    if let Some(log) = factor.top(evidence, &others, base)? {
+        factor.middle = log;
+    } else {
+        let _ = factor.round(evidence, &others, base)?;
+    }
+    Some((place, factor.middle.exp()))
 }
 
 /// Where the top of a parabola through three numbers at equal steps is, in steps from the middle one; `None` if it has none.
