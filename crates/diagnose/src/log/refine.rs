@@ -86,9 +86,6 @@ pub(crate) fn refine(
     knobs: Vec<Knob>,
     steps: usize,
 ) -> Option<Fitted> {
-    /// Log-likelihood that its roughness may take, as readings come and go at edges: where a whole step would gain less and does not
-    /// gain it, a part of it is not worth trying.
-    const ROUGH: f64 = 2.0;
     let mut settings = settings;
     let mut now = evidence.assess(&settings, &knobs)?;
     for _ in 0..steps {
@@ -97,13 +94,10 @@ pub(crate) fn refine(
         if solution.gain.is_nan() || solution.gain <= 0.02 {
             break;
         }
-        let tried = if solution.gain < ROUGH { 1 } else { usize::MAX };
-        let accepted = trials(&settings, &knobs, &solution)
-            .take(tried)
-            .find_map(|trial| {
-                let then = evidence.assess(&trial, &knobs)?;
-                (then.total() > now.total()).then_some((trial, then))
-            });
+        let accepted = trials(&settings, &knobs, &solution).find_map(|trial| {
+            let then = evidence.assess(&trial, &knobs)?;
+            (then.total() > now.total()).then_some((trial, then))
+        });
         let Some((trial, then)) = accepted else { break };
         let small = then.total() - now.total() < 0.01;
         (settings, now) = (trial, then);
