@@ -224,8 +224,13 @@ impl<'a> Evidence<'a> {
 
     fn where_run(&self, wanted: impl Fn(usize) -> bool) -> Self {
         let stretches = self.stretches.iter().filter(|stretch| wanted(stretch.run));
+        self.of(stretches.cloned().collect())
+    }
+
+    /// The evidence that these stretches give.
+    fn of(&self, stretches: Vec<Stretch<'a>>) -> Self {
         Self {
-            stretches: stretches.cloned().collect(),
+            stretches,
             asked: Asked::nothing(),
             ..*self
         }
@@ -271,11 +276,7 @@ impl<'a> Evidence<'a> {
             Some(own)
         };
         let stretches: Vec<Stretch<'a>> = (self.stretches.par_iter().map(narrowed)).collect::<Option<_>>()?;
-        let narrowed = Self {
-            stretches,
-            asked: Asked::nothing(),
-            ..*self
-        };
+        let narrowed = self.of(stretches);
         let (before, left) = (self.numbers(), narrowed.numbers());
         ((before - left) as f64 > FEW * before as f64).then_some(narrowed)
     }

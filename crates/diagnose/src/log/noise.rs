@@ -181,6 +181,12 @@ impl Factor {
         evidence.likelihood(&self.beside(settings, log))
     }
 
+    /// The gain there and so far to either side, the smaller factor first.
+    fn about(&self, evidence: &Evidence<'_>, settings: &[Setting], base: f64, half: f64) -> Option<[f64; 3]> {
+        let at = |log: f64| Some(self.at(evidence, settings, log)? - base);
+        Some([at(self.middle - half)?, self.gain, at(self.middle + half)?])
+    }
+
     fn beside(&self, settings: &[Setting], log: f64) -> Vec<Setting> {
         let own = Setting::constant(self.spec, [log.exp()]);
         settings.iter().cloned().chain([own]).collect()
@@ -209,8 +215,8 @@ impl Factor {
             return Some(ControlFlow::Break(()));
         }
         let at = |log: f64| Some(self.at(evidence, settings, log)? - base);
-        let (low, high) = (at(middle - half)?, at(middle + half)?);
-        let top = top_of_parabola([low, self.gain, high]).map(|steps| steps * half);
+        let about @ [low, _, high] = self.about(evidence, settings, base, half)?;
+        let top = top_of_parabola(about).map(|steps| steps * half);
         let step = top.map_or(0.8 * (high - low).signum(), |step| step.clamp(-1.2, 1.2));
         let step = step.clamp(lowest - middle, highest - middle);
         // The best of the three is a start as good as the vertex of their parabola.
@@ -244,10 +250,9 @@ impl Factor {
         if !self.reaches(self.half) {
             return Some(None);
         }
-        let at = |log: f64| Some(self.at(evidence, settings, log)? - base);
-        let (low, high) = (at(self.middle - self.half)?, at(self.middle + self.half)?);
-        let top = top_of_parabola([low, self.gain, high]).filter(|steps| steps.abs() < TRUSTED);
-        Some(top.map(|steps| self.middle + steps * self.half))
+        let top = top_of_parabola(self.about(evidence, settings, base, self.half)?);
+        let near = top.filter(|steps| steps.abs() < TRUSTED);
+        Some(near.map(|steps| self.middle + steps * self.half))
     }
 
     /// At its best.
@@ -271,9 +276,8 @@ impl Factor {
         /// Logarithm of the factor to either side over which the log-likelihood's curvature tells the error: it is rough at
         /// a smaller scale, as readings come and go at edges.
         const WIDE: f64 = 0.08;
-        let at = |log: f64| Some(self.at(evidence, settings, log)? - base);
-        let (low, high) = (at(self.middle - WIDE)?, at(self.middle + WIDE)?);
-        let bend = (high - 2.0 * self.gain + low) / (WIDE * WIDE);
+        let [low, middle, high] = self.about(evidence, settings, base, WIDE)?;
+        let bend = (high - 2.0 * middle + low) / (WIDE * WIDE);
         Some((-bend).max(1e-9).sqrt().recip())
     }
 
