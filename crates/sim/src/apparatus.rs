@@ -25,7 +25,7 @@ pub(crate) struct Apparatus<'w> {
     pub(crate) machine: Machine,
     pub(crate) sights: Vec<Sight>,
     /// Most of the same rays by sensors, where these have many and hold still among walls that do.
-    pub(crate) cones: Option<&'w Cones>,
+    pub(crate) cones: Option<Arc<Cones>>,
     pub(crate) geometry: Arc<Geometry>,
     /// Whether an effect must be asked for every ray.
     pub(crate) weighs_rays: bool,
@@ -62,9 +62,18 @@ impl<'w> Apparatus<'w> {
             steps: 0,
         };
         if !apparatus.moves() {
-            apparatus.cones = world.cones.as_ref();
+            apparatus.cones = apparatus.cones();
         }
         Ok(apparatus)
+    }
+
+    /// The rays of sensors by sensors, where these have many.
+    fn cones(&self) -> Option<Arc<Cones>> {
+        let (own, worlds) = (&self.machine, &self.world.machine);
+        if own.beam == worlds.beam && own.mounts == worlds.mounts {
+            return self.world.cones.clone();
+        }
+        self.world.scene.cones(own, &self.geometry)
     }
 
     /// Whether walls or sensors may move in time.
@@ -123,8 +132,8 @@ impl<'w> Apparatus<'w> {
 
     /// Most rays of sensors that have many, pack by pack, as long as nothing but their distances matters.
     #[inline]
-    pub(crate) fn cones(&self) -> Option<&'w Cones> {
-        self.cones.filter(|_| !self.weighs_rays)
+    pub(crate) fn cones_of_distances(&self) -> Option<&Cones> {
+        self.cones.as_deref().filter(|_| !self.weighs_rays)
     }
 
     /// What the effects make of the responses of the rays; anything of one that met no wall.
@@ -141,6 +150,7 @@ impl<'w> Apparatus<'w> {
             walls: &self.geometry.walls,
             rays,
             hits,
+            of_one: None,
         }
     }
 }

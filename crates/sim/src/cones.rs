@@ -2,7 +2,8 @@
 
 use track::Vec2;
 
-use crate::cast::{Caster, CasterKind, LANES, Rays};
+use crate::cast::{Caster, CasterKind, Hits, LANES, Rays};
+use crate::world::Geometry;
 use crate::{Machine, Mount, Pose, Walls};
 
 /// The rays of all sensors, pack by pack.
@@ -19,6 +20,8 @@ pub(crate) struct Cones {
 #[derive(Debug)]
 pub(crate) struct Pack {
     pub(crate) sensor: usize,
+    /// Number of the first among the sensor's rays.
+    first: usize,
     pub(crate) weights: [f64; LANES],
     /// In the body frame.
     rays: Rays,
@@ -28,24 +31,25 @@ pub(crate) struct Pack {
 }
 
 impl Cones {
-    /// Those of a machine among walls; `None` if its sensors have few rays each.
-    pub(crate) fn new(machine: &Machine, walls: &Walls, kind: Option<CasterKind>) -> Option<Self> {
+    /// Those of a machine among walls, as far as its rays go there; `None` if its sensors have few rays each.
+    pub(crate) fn new(machine: &Machine, geometry: &Geometry, kind: Option<CasterKind>) -> Option<Self> {
         /// Rays of a sensor fewer than which are quicker one by one, on all sensors together (benches/step.rs).
         const FEW: usize = 5;
-        let rays = machine.beam.rays();
+        let Geometry { walls, range_m, .. } = geometry;
+        let (rays, range_m) = (machine.beam.rays(), *range_m);
         let left = rays.len() % LANES;
         let sights = if left < FEW { rays.len() - left } else { rays.len() };
         if sights == 0 {
             return None;
         }
         let of_sensor = |sensor: usize| {
-            let packs = rays[..sights].chunks(LANES);
-            packs.map(move |rays| Pack::new(sensor, machine.mounts[sensor], rays, machine.range_m))
+            let packs = rays[..sights].chunks(LANES).enumerate();
+            packs.map(move |(i, rays)| Pack::new((sensor, i * LANES), machine.mounts[sensor], rays, range_m))
         };
         let packs: Vec<Pack> = (0..LANES).flat_map(of_sensor).collect();
         let radius_m = packs.iter().map(|pack| pack.radius_m).fold(0.0, f64::max);
         Some(Self {
-            caster: Caster::about_disc(kind, walls, machine.range_m, radius_m),
+            caster: Caster::about_disc(kind, walls, range_m, radius_m),
             packs,
             sights,
         })
@@ -56,19 +60,24 @@ impl Cones {
         self.sights
     }
 
-    /// Calls `found` with every pack and its rays' distances, m; those of a sensor in the order of its rays.
+    /// Calls `found` with every pack, its rays and what they hit; those of a sensor in the order of its rays.
     #[inline]
-    pub(crate) fn cast(&self, walls: &Walls, pose: Pose, mut found: impl FnMut(&Pack, &[f64; LANES])) {
+    pub(crate) fn cast(&self, walls: &Walls, pose: Pose, mut found: impl FnMut(&Pack, &Rays, &Hits)) {
         for pack in &self.packs {
             let middle = pose.position + pose.heading.rotate(pack.middle);
-            let hits = self.caster.cast(walls, middle, &pack.rays.placed(pose));
-            found(pack, &hits.distance_m);
+            let rays = pack.rays.placed(pose);
+            found(pack, &rays, &self.caster.cast(walls, middle, &rays));
         }
     }
 }
 
 impl Pack {
-    fn new(sensor: usize, mount: Mount, rays: &[(Vec2, f64)], range_m: f64) -> Self {
+    /// Where in the pack the sensor's ray of a number is, if it is.
+    pub(crate) fn place_of(&self, number: usize) -> Option<usize> {
+        number.checked_sub(self.first).filter(|place| *place < LANES)
+    }
+
+    fn new((sensor, first_number): (usize, usize), mount: Mount, rays: &[(Vec2, f64)], range_m: f64) -> Self {
         /// Far more than the rounding of a place, m.
         const MARGIN_M: f64 = 1e-9;
         let axis = mount.axis();
@@ -78,6 +87,7 @@ impl Pack {
         let ray = |i: usize| (mount.position, axis.rotate(rays[i.min(rays.len() - 1)].0));
         Self {
             sensor,
+            first: first_number,
             weights: std::array::from_fn(|i| rays.get(i).map_or(0.0, |ray| ray.1)),
             rays: Rays::new(std::array::from_fn(ray)),
             middle: mount.position + axis.rotate(along) * ahead_m,
@@ -130,7 +140,7 @@ mod tests {
         let sights = |rays: usize| {
             let mut machine = declared().machine;
             machine.beam = Beam::cone(rays, 0.3, Combine::Responses).unwrap();
-            Cones::new(&machine, scene().walls(), None).map_or(0, |cones| cones.sights())
+            Cones::new(&machine, scene().declared_geometry(), None).map_or(0, |cones| cones.sights())
         };
         assert_eq!([1, 4, 5, 8, 10, 13, 16].map(sights), [0, 0, 5, 8, 8, 13, 16]);
     }

@@ -2,7 +2,8 @@
 
 use crate::apparatus::Apparatus;
 use crate::cast::{Hits, LANES, Rays};
-use crate::effects::Hit;
+use crate::cones::Cones;
+use crate::effects::{Hit, RayHits};
 use crate::forecast::PoseMatrix;
 use crate::{Combine, Pose, Readings, Response};
 
@@ -32,9 +33,19 @@ pub struct Look {
     response: Readings,
 }
 
-/// Where the rays of a look met walls: what all forecasts of one world that see this look need of it.
+/// Where eight rays met walls, with their directions along the walls' normals: of a look, what all forecasts of one world that see it
+/// need of it.
 #[derive(Debug)]
 pub struct Places([Option<(Hit, f64)>; LANES]);
+
+impl Places {
+    fn of(ray_hits: &RayHits<'_>) -> Self {
+        let is_met = |lane: usize| ray_hits.hits.distance_m[lane].is_finite();
+        Self(std::array::from_fn(|lane| {
+            is_met(lane).then(|| ray_hits.hit_with_direction(lane))
+        }))
+    }
+}
 
 /// Eight rays, one of each sensor: how their distances change with x, y and heading, and the standard deviations of these, m.
 struct Doubt {
@@ -67,7 +78,7 @@ struct InRange {
     density: [f64; LANES],
 }
 
-/// What the rays of all sights add up to: as in [`Outlook`], axis by axis.
+/// What rays, or all rays of each sensor, add up to: as in [`Outlook`], axis by axis.
 #[derive(Default)]
 struct Total {
     mean: Readings,
@@ -75,6 +86,34 @@ struct Total {
     edge_variance: Readings,
     /// What effects add to a factor of 1, of sensors that average distances.
     factor: [f64; LANES],
+}
+
+impl Total {
+    /// Adds eight rays, one of each sensor.
+    #[inline(always)]
+    fn add_each(&mut self, rays: &Self) {
+        for lane in 0..LANES {
+            self.add((lane, lane), rays);
+        }
+    }
+
+    /// Adds eight rays of one sensor.
+    #[inline]
+    fn add_all(&mut self, sensor: usize, rays: &Self) {
+        for ray in 0..LANES {
+            self.add((ray, sensor), rays);
+        }
+    }
+
+    #[inline(always)]
+    fn add(&mut self, (ray, sensor): (usize, usize), rays: &Self) {
+        self.mean[sensor] += rays.mean[ray];
+        self.edge_variance[sensor] += rays.edge_variance[ray];
+        self.factor[sensor] += rays.factor[ray];
+        for (own, further) in self.slope.iter_mut().zip(&rays.slope) {
+            own[sensor] += further[ray];
+        }
+    }
 }
 
 /// Standard deviations of a distance beyond which it is surely within the range, or surely not.
@@ -93,14 +132,25 @@ impl Apparatus<'_> {
         let mut look = Look::default();
         let mut total = Total::default();
         let middle = self.sights.len() / 2;
-        for (number, sight) in self.sights.iter().enumerate() {
+        let in_packs = self.cones.as_deref().map_or(0, Cones::sights);
+        if let Some(cones) = &self.cones {
+            cones.cast(&self.geometry.walls, pose, |pack, rays, hits| {
+                if hits.is_none() {
+                    return;
+                }
+                let met = self.met(&self.ray_hits(rays, hits).of_sensor(pack.sensor));
+                let doubt = self.doubt(pose, covariance, rays, hits);
+                total.add_all(pack.sensor, &self.shares(&pack.weights, &met, &doubt));
+                if let Some(ray) = pack.place_of(middle) {
+                    look.take((ray, pack.sensor), rays, hits, &met, &doubt);
+                }
+            });
+        }
+        for (number, sight) in self.sights.iter().enumerate().skip(in_packs) {
             let (rays, hits) = self.cast(pose, sight);
-            let met = self.met(&rays, &hits);
+            let met = self.met(&self.ray_hits(&rays, &hits));
             let doubt = self.doubt(pose, covariance, &rays, &hits);
-            match self.machine.beam.combine {
-                Combine::Responses => self.add_responses(&mut total, sight.weight, &met, &doubt),
-                Combine::Distances => self.add_shortfalls(&mut total, sight.weight, &met, &doubt),
-            }
+            total.add_each(&self.shares(&[sight.weight; LANES], &met, &doubt));
             if number == middle {
                 look = Look {
                     deviation_m: doubt.deviation_m,
@@ -147,7 +197,7 @@ impl Apparatus<'_> {
 
     /// The same responses from a look that one ray a sensor had before.
     pub(crate) fn responses_again(&self, look: &Look) -> Readings {
-        self.responses_to(&self.met(&look.rays, &look.hits), look)
+        self.responses_to(&self.met(&self.ray_hits(&look.rays, &look.hits)), look)
     }
 
     fn responses_to(&self, met: &Met, look: &Look) -> Readings {
@@ -165,12 +215,12 @@ impl Apparatus<'_> {
 
     /// What the rays met after what displaces the walls to first order.
     #[inline]
-    fn met(&self, rays: &Rays, hits: &Hits) -> Met {
+    fn met(&self, ray_hits: &RayHits<'_>) -> Met {
         if self.weighs_rays || !self.displacing.is_empty() {
-            return self.met_at(hits, &self.places(rays, hits));
+            return self.met_at(ray_hits.hits, &Places::of(ray_hits));
         }
         Met {
-            distance_m: hits.distance_m,
+            distance_m: ray_hits.hits.distance_m,
             factor: [1.0; LANES],
         }
     }
@@ -194,52 +244,57 @@ impl Apparatus<'_> {
         met
     }
 
-    fn places(&self, rays: &Rays, hits: &Hits) -> Places {
-        Places(std::array::from_fn(|lane| {
-            hits.distance_m[lane]
-                .is_finite()
-                .then(|| self.ray_hits(rays, hits).hit_with_direction(lane))
-        }))
-    }
-
     /// What the rays of a look met, among walls that are this one's.
     pub(crate) fn places_of(&self, look: &Look) -> Places {
-        self.places(&look.rays, &look.hits)
+        Places::of(&self.ray_hits(&look.rays, &look.hits))
     }
 
-    /// Adds the share of eight rays in the readings.
+    /// What eight rays add to what their sensors' rays add up to.
     #[inline]
-    fn add_responses(&self, total: &mut Total, weight: f64, met: &Met, doubt: &Doubt) {
+    fn shares(&self, weights: &[f64; LANES], met: &Met, doubt: &Doubt) -> Total {
+        match self.machine.beam.combine {
+            Combine::Responses => self.responses(weights, met, doubt),
+            Combine::Distances => self.shortfalls(weights, met, doubt),
+        }
+    }
+
+    /// The shares of eight rays in the readings.
+    #[inline]
+    fn responses(&self, weights: &[f64; LANES], met: &Met, doubt: &Doubt) -> Total {
         let Bends { value, rise, curve } = bends(&self.machine.response, &met.distance_m);
         let InRange { seen, density } = self.in_range(met, &doubt.deviation_m);
+        let mut shares = Total::default();
         for lane in 0..LANES {
             let (value, seen, density) = (value[lane], seen[lane], density[lane]);
             let deviation_m = doubt.deviation_m[lane];
-            let share = weight * met.factor[lane];
+            let share = weights[lane] * met.factor[lane];
             let edge = density * deviation_m;
             let spread = seen * (1.0 - seen) - edge * edge;
             let most = share * value;
-            total.edge_variance[lane] += most * most * spread.max(0.0);
-            total.mean[lane] += share * seen * curved(value, curve[lane], deviation_m);
+            shares.edge_variance[lane] = most * most * spread.max(0.0);
+            shares.mean[lane] = share * seen * curved(value, curve[lane], deviation_m);
             let rise = share * (seen * rise[lane] - density * value);
             for axis in 0..3 {
-                total.slope[axis][lane] += rise * doubt.slope[axis][lane];
+                shares.slope[axis][lane] = rise * doubt.slope[axis][lane];
             }
         }
+        shares
     }
 
-    /// Adds the share of eight rays in the shortfall from the range of sensors that average distances.
-    fn add_shortfalls(&self, total: &mut Total, weight: f64, met: &Met, doubt: &Doubt) {
+    /// The shares of eight rays in the shortfall from the range of sensors that average distances.
+    fn shortfalls(&self, weights: &[f64; LANES], met: &Met, doubt: &Doubt) -> Total {
+        let mut shares = Total::default();
         for lane in 0..LANES {
-            let short_m = self.machine.range_m - met.distance_m[lane];
+            let (weight, short_m) = (weights[lane], self.machine.range_m - met.distance_m[lane]);
             if short_m >= -SURE * doubt.deviation_m[lane] {
-                total.mean[lane] += weight * short_m;
-                total.factor[lane] += weight * (met.factor[lane] - 1.0);
+                shares.mean[lane] = weight * short_m;
+                shares.factor[lane] = weight * (met.factor[lane] - 1.0);
                 for axis in 0..3 {
-                    total.slope[axis][lane] -= weight * doubt.slope[axis][lane];
+                    shares.slope[axis][lane] = -weight * doubt.slope[axis][lane];
                 }
             }
         }
+        shares
     }
 
     /// From the mean shortfall of the distances to the response at the mean distance.
@@ -320,6 +375,15 @@ impl Default for Look {
 }
 
 impl Look {
+    /// Takes a ray among others, as that along its sensor's axis.
+    fn take(&mut self, (ray, sensor): (usize, usize), rays: &Rays, hits: &Hits, met: &Met, doubt: &Doubt) {
+        self.rays.set(sensor, rays, ray);
+        self.hits.distance_m[sensor] = hits.distance_m[ray];
+        self.hits.segment[sensor] = hits.segment[ray];
+        self.factor[sensor] = met.factor[ray];
+        self.deviation_m[sensor] = doubt.deviation_m[ray];
+    }
+
     /// Distance along each sensor's axis, m; infinite where there is no wall.
     pub fn distance_m(&self) -> &[f64; LANES] {
         &self.hits.distance_m
@@ -403,8 +467,9 @@ fn normal_cdf(z: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use super::Apparatus;
     use crate::effects::testing::{scene, silent, steps, with};
-    use crate::{Beam, Combine, Forecast, Model};
+    use crate::{Beam, Combine, Forecast, Model, Setting};
 
     fn seeing(model: &Model, rays: usize, combine: Combine) -> Model {
         let mut model = model.clone();
@@ -438,6 +503,40 @@ mod tests {
                     }
                 }
                 assert!(seen > 1000);
+            }
+        }
+    }
+
+    #[test]
+    fn rays_by_sensors_tell_what_they_tell_one_by_one() {
+        let known = [[4e-6, 1e-6, 0.0], [1e-6, 4e-6, 0.0], [0.0, 0.0, 1e-3]];
+        let models = [silent(), with(&silent(), "outer-wall-reflectance", &[0.7])];
+        let beside = Setting::constant(crate::find("sensor-rotation").unwrap(), [0.1]);
+        for (model, rays) in models
+            .iter()
+            .flat_map(|model| [5, 7, 10, 21].map(|rays| (model, rays)))
+        {
+            for combine in [Combine::Responses, Combine::Distances] {
+                let model = seeing(model, rays, combine);
+                let world = scene().world(&model, 0).unwrap();
+                for further in [None, Some(beside.clone())] {
+                    let further = further.as_slice();
+                    let by_sensors = Apparatus::new(&world, further).unwrap();
+                    let mut by_rays = Apparatus::new(&world, further).unwrap();
+                    assert!(by_rays.cones.take().is_some());
+                    for (pose, _) in steps(&model, 0, 5, 200) {
+                        let [one, other] =
+                            [&by_sensors, &by_rays].map(|apparatus| apparatus.outlook(pose, &known));
+                        assert_eq!(
+                            (one.mean, one.slope, one.edge_variance),
+                            (other.mean, other.slope, other.edge_variance)
+                        );
+                        assert_eq!(one.look.distance_m(), other.look.distance_m());
+                        assert_eq!(one.look.deviation_m, other.look.deviation_m);
+                        let met = [&one, &other].map(|outlook| by_rays.responses_again(&outlook.look));
+                        assert_eq!(met[0], met[1]);
+                    }
+                }
             }
         }
     }

@@ -202,7 +202,7 @@ impl<'w> Run<'w> {
     #[inline(always)]
     fn after_cones(&self, share: fn(&Self, &Cones) -> [f64; LANES]) -> ([f64; LANES], &[Sight]) {
         let sights = &self.apparatus.sights;
-        match self.apparatus.cones() {
+        match self.apparatus.cones_of_distances() {
             Some(cones) => (share(self, cones), &sights[cones.sights()..]),
             None => ([0.0; LANES], sights),
         }
@@ -241,7 +241,8 @@ impl<'w> Run<'w> {
             range_m, response, ..
         } = &self.apparatus.machine;
         let mut total = [0.0; LANES];
-        cones.cast(&self.apparatus.geometry.walls, self.pose, |pack, distances_m| {
+        cones.cast(&self.apparatus.geometry.walls, self.pose, |pack, _, hits| {
+            let distances_m = &hits.distance_m;
             if distances_m.iter().any(|distance_m| distance_m <= range_m) {
                 let values = response.readings(distances_m);
                 for ray in 0..LANES {
@@ -284,9 +285,9 @@ impl<'w> Run<'w> {
     fn mean_distance_of(&self, cones: &Cones) -> [f64; LANES] {
         let range_m = self.apparatus.machine.range_m;
         let mut mean = [0.0; LANES];
-        cones.cast(&self.apparatus.geometry.walls, self.pose, |pack, distances_m| {
+        cones.cast(&self.apparatus.geometry.walls, self.pose, |pack, _, hits| {
             for ray in 0..LANES {
-                mean[pack.sensor] += pack.weights[ray] * distances_m[ray].min(range_m);
+                mean[pack.sensor] += pack.weights[ray] * hits.distance_m[ray].min(range_m);
             }
         });
         mean

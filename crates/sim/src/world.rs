@@ -156,6 +156,12 @@ impl Scene {
         &self.declared.caster
     }
 
+    /// The walls without effects.
+    #[cfg(test)]
+    pub(crate) fn declared_geometry(&self) -> &Geometry {
+        &self.declared
+    }
+
     /// What run number `run` of a model drives in. The model must have the wall rules that the scene was made for.
     ///
     /// # Errors
@@ -173,12 +179,17 @@ impl Scene {
         let geometry = self.geometry(&effects, &machine);
         Ok(World {
             scene: self,
-            cones: Cones::new(&machine, &geometry.walls, self.kind),
+            cones: self.cones(&machine, &geometry),
             model: model.clone(),
             run,
             machine,
             geometry,
         })
+    }
+
+    /// The rays of a machine's sensors by sensors, where these have many.
+    pub(crate) fn cones(&self, machine: &Machine, geometry: &Geometry) -> Option<Arc<Cones>> {
+        Cones::new(machine, geometry, self.kind).map(Arc::new)
     }
 
     /// The walls as the effects move them.
@@ -307,7 +318,7 @@ pub struct World<'s> {
     pub(crate) machine: Machine,
     pub(crate) geometry: Arc<Geometry>,
     /// The rays of its sensors, if these have many.
-    pub(crate) cones: Option<Cones>,
+    pub(crate) cones: Option<Arc<Cones>>,
 }
 
 impl World<'_> {

@@ -65,6 +65,14 @@ impl Rays {
         Vec2::new(self.origin_x[i], self.origin_y[i])
     }
 
+    /// Puts ray `from` of others in place `i`.
+    pub(crate) fn set(&mut self, i: usize, others: &Self, from: usize) {
+        self.origin_x[i] = others.origin_x[from];
+        self.origin_y[i] = others.origin_y[from];
+        self.direction_x[i] = others.direction_x[from];
+        self.direction_y[i] = others.direction_y[from];
+    }
+
     /// Unit direction of ray `i`.
     pub fn direction(&self, i: usize) -> Vec2 {
         Vec2::new(self.direction_x[i], self.direction_y[i])
@@ -86,6 +94,14 @@ impl Hits {
         distance_m: [f64::INFINITY; LANES],
         segment: [0; LANES],
     };
+
+    /// Whether no ray met a wall.
+    #[inline]
+    pub(crate) fn is_none(&self) -> bool {
+        self.distance_m
+            .iter()
+            .all(|&distance_m| distance_m == f64::INFINITY)
+    }
 
     /// The same without what is beyond a range.
     #[inline(always)]

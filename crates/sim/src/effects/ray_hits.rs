@@ -6,16 +6,26 @@ use super::{Hit, Site};
 use crate::cast::{Hits, LANES, Rays};
 use crate::{Scene, Walls};
 
-/// What eight rays, one of each sensor, met: each thing is computed where it is asked for.
+/// What eight rays, one of each sensor or all of one, met: each thing is computed where it is asked for.
 #[derive(Debug, Clone, Copy)]
 pub struct RayHits<'a> {
     pub(crate) scene: &'a Scene,
     pub(crate) walls: &'a Walls,
     pub(crate) rays: &'a Rays,
     pub(crate) hits: &'a Hits,
+    /// The sensor that all rays are of; `None` where each is of the sensor of its number.
+    pub(crate) of_one: Option<usize>,
 }
 
 impl RayHits<'_> {
+    /// The same where all rays are of one sensor.
+    pub(crate) fn of_sensor(self, sensor: usize) -> Self {
+        Self {
+            of_one: Some(sensor),
+            ..self
+        }
+    }
+
     /// The rays that met a wall.
     pub fn lanes(&self) -> impl Iterator<Item = usize> + '_ {
         (0..LANES).filter(|&lane| self.hits.distance_m[lane] < f64::INFINITY)
@@ -52,6 +62,7 @@ impl RayHits<'_> {
             walls,
             rays,
             hits,
+            ..
         } = self;
         let point = rays.origin(lane) + rays.direction(lane) * hits.distance_m[lane];
         scene.site(walls.place(hits.segment[lane] as usize, point))
@@ -69,7 +80,7 @@ impl RayHits<'_> {
         let normal = self.walls.normal(self.hits.segment[lane] as usize);
         let towards = normal.dot(self.rays.direction(lane));
         let hit = Hit {
-            sensor: lane,
+            sensor: self.of_one.unwrap_or(lane),
             distance_m: self.hits.distance_m[lane],
             cos_incidence: towards.abs().min(1.0),
             site: self.site(lane),

@@ -130,6 +130,7 @@ fn factors_of_eight_rays_are_those_of_each() {
                 walls,
                 rays: &rays,
                 hits: &hits,
+                of_one: None,
             };
             let mut factors = [2.0; LANES];
             effect.ray_factors(&values, &hits, &mut factors);
