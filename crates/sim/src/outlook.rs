@@ -216,13 +216,20 @@ impl Apparatus<'_> {
     /// What the rays met after what displaces the walls to first order.
     #[inline]
     fn met(&self, ray_hits: &RayHits<'_>) -> Met {
-        if self.weighs_rays || !self.displacing.is_empty() {
+        if !self.displacing.is_empty() {
             return self.met_at(ray_hits.hits, &Places::of(ray_hits));
         }
-        Met {
+        let mut met = Met {
             distance_m: ray_hits.hits.distance_m,
             factor: [1.0; LANES],
+        };
+        if self.weighs_rays {
+            let factors = self.effects.ray_factors(ray_hits);
+            for lane in ray_hits.lanes() {
+                met.factor[lane] = factors[lane];
+            }
         }
+        met
     }
 
     /// The same where it is known what the rays met.
