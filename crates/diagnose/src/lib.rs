@@ -22,7 +22,7 @@ pub use detectable::Detectable;
 pub use error::{Error, Toward};
 pub use laps::{
     Atlas, Baselines, Beginning, Departures, Extent, LapDiagnosis, MeanBeginning, ObservedLap, ObservedRun,
-    Quadratic, Rival, Simulate, Unseen, separations,
+    Quadratic, Rival, Simulate, TELLS_NOTHING, Unseen, separations,
 };
 pub use log::{
     Agree, Channel, Decided, Implausible, LogDiagnosis, LogRow, LoggedRun, Spoilt, can_be_followed,

@@ -1,7 +1,9 @@
 //! The experiment that would tell apart what these data do not.
 
 use anyhow::Result;
-use diagnose::{Answer, Explanation, Extent, LogRow, ObservedRun, Rival, log_separation, separations};
+use diagnose::{
+    Answer, Explanation, Extent, LogRow, ObservedRun, Rival, TELLS_NOTHING, log_separation, separations,
+};
 use sim::{Controller, Setting, Stage, Step, Streams};
 
 use super::Trace;
@@ -199,9 +201,7 @@ fn looked_at(
 
 /// Experiments that tell something, the best first: those that tell the answer from most rivals, and of these those that take fewest laps.
 fn best_first(mut found: Vec<Experiment>) -> Vec<Experiment> {
-    /// Standard deviations that tell nothing.
-    const NOTHING: f64 = 0.3;
-    found.retain(|experiment| experiment.least() > NOTHING);
+    found.retain(|experiment| experiment.least() > TELLS_NOTHING);
     let of_a_lap = |experiment: &Experiment| experiment.least() / (experiment.laps as f64).sqrt();
     found.sort_by(|a, b| {
         let told = b.told().count().cmp(&a.told().count());

@@ -64,7 +64,7 @@ pub use baseline::Baselines;
 pub use beginning::{Beginning, MeanBeginning};
 pub use diagnosis::LapDiagnosis;
 pub use observed::{ObservedLap, ObservedRun};
-pub use separation::{Rival, separations};
+pub use separation::{Rival, TELLS_NOTHING, separations};
 pub(crate) use tests_of_fit::SIGNIFICANT_P;
 pub use tests_of_fit::{Departures, Quadratic};
 pub use unseen::Unseen;

@@ -14,6 +14,9 @@ const SETS: [u64; 12] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11];
 /// Some of each half, simulated with one number moved: with the same draws few tell what that changes.
 const FEW: [u64; 4] = [0, 1, 6, 7];
 
+/// Standard deviations between two explanations that tell nothing.
+pub const TELLS_NOTHING: f64 = 0.3;
+
 /// An explanation that an experiment has to tell from the answer.
 #[derive(Debug, Clone)]
 pub struct Rival {
@@ -49,11 +52,17 @@ pub fn separations(
     };
     let separation = |rival: &Rival| {
         let expected = simulated(simulate, &rival.settings, &SETS)?;
+        let offset = away(&answered, &expected);
+        let plain = nearest(&offset, &[]);
+        // Moved numbers bring it nearer yet.
+        if plain < TELLS_NOTHING {
+            return Some(plain);
+        }
         let few = FEW.map(|set| expected[set as usize].clone());
         // A number with which the robot crashes stays.
         let moved = (rival.moved.iter()).filter_map(|settings| simulated(simulate, settings, &FEW));
         let moved: Vec<[White; 2]> = moved.map(|moved| away(&moved, &few)).collect();
-        Some(nearest(&away(&answered, &expected), &moved))
+        Some(nearest(&offset, &moved))
     };
     Some(rivals.iter().map(separation).collect())
 }
