@@ -137,14 +137,14 @@ struct Logs<'l> {
 
 impl Logs<'_> {
     /// The answer of a search between the walls that the logs like best beside its best candidate; `is_clear` if the readings that count
-    /// are those that do beside that. What is missing blurs where the corners are: they are looked for again beside each of the further
-    /// effects, so many of which have been found.
+    /// are those that do beside that. What is missing blurs where the corners are: they are looked for again after each of the
+    /// rounds in which further effects were found.
     fn between_walls(
         &self,
         search: Search<'_>,
         corners: Corners,
         is_clear: bool,
-        further: usize,
+        rounds: usize,
         rest: (Decision, Spoilt),
     ) -> Result<LogDiagnosis, Error> {
         let best = search.best_in_words();
@@ -162,14 +162,14 @@ impl Logs<'_> {
         (self.watch)(&format!("what is beside {best}"));
         let found = corners_of(&again);
         if is_clear && found == corners {
-            return self.one_more_beside(search, corners, further, rest);
+            return self.one_more_beside(search, corners, rounds, rest);
         }
         let declared = (self.declared).elsewhere(again.as_ref().map_or(self.scene, |found| &found.1));
         let clear = declared.clear_with_each(search.rivals());
         self.one_more_beside(
             search.renewed(clear.unwrap_or(declared), NOT_FAR)?,
             found,
-            further,
+            rounds,
             rest,
         )
     }
@@ -179,27 +179,29 @@ impl Logs<'_> {
         &self,
         mut search: Search<'_>,
         corners: Corners,
-        further: usize,
+        rounds: usize,
         rest: (Decision, Spoilt),
     ) -> Result<LogDiagnosis, Error> {
-        /// Further effects at most; between other walls there may be fewer again.
-        const MOST: usize = 2;
-        if further == 0 {
+        /// Effects at most; between other walls there may be fewer again.
+        const MOST: usize = 3;
+        /// Rounds in which they are looked for at most: one that is found may do without another.
+        const ROUNDS: usize = 3;
+        if rounds == 0 {
             search.unnamed = search.unnamed_before_pairs(self.leads);
         }
         let found = if search.unnamed.is_some() {
             None
-        } else if further < MOST && search.one_more(self.leads) {
-            Some(further + 1)
-        } else if further <= MOST && search.exchange() {
+        } else if rounds < ROUNDS && search.best().len() < MOST && search.one_more(self.leads) {
+            Some(rounds + 1)
+        } else if rounds <= ROUNDS && search.exchange() {
             // What is found in place of others is the last.
-            Some(MOST + 1)
+            Some(ROUNDS + 1)
         } else {
             None
         };
-        if let Some(further) = found {
+        if let Some(rounds) = found {
             let is_clear = search.evidence.clear_with_each(search.rivals()).is_none();
-            return self.between_walls(search, corners, is_clear, further, rest);
+            return self.between_walls(search, corners, is_clear, rounds, rest);
         }
         let (decision, spoilt) = rest;
         search.prefer_what_laps_agree_with(&decision.decided, self.agree);

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::evidence::Evidence;
 use super::leads::{By, Lead, most, of_constant_size, shortlist};
-use super::noise::{Factor, by_chance, noises, p_among_repeats};
+use super::noise::{Factor, by_chance, is_noise, noises, p_among_repeats};
 use super::pairs::{Pair, pairs};
 use super::refined::Refined;
 use super::repeat::repeats;
@@ -17,11 +17,17 @@ use crate::laps::SIGNIFICANT_P;
 
 impl Search<'_> {
     /// Looks for one more effect beside the best candidate, and beside one of one effect for the best pairs, if that leaves more than it
-    /// does in logs that have nothing else; whether the best candidate has more effects then.
+    /// does in logs that have nothing else; whether the best candidate has other effects then.
     pub(super) fn one_more(&mut self, first: &[Lead]) -> bool {
-        let before = self.best().len();
+        let effects = |search: &Self| {
+            search
+                .found
+                .first()
+                .map(|best| (best.settings.len(), best.names()))
+        };
+        let before = effects(self);
         self.look_beside_best(first);
-        self.best().len() > before
+        effects(self) != before
     }
 
     fn look_beside_best(&mut self, first: &[Lead]) {
@@ -70,8 +76,9 @@ impl Search<'_> {
         self.sort();
     }
 
-    /// Looks, where the best candidate of several effects leaves what matters, for others in place of each of them: the first effects stood
-    /// for a part of those that were not found yet. Whether there is a better candidate then.
+    /// Looks, where the best candidate of several effects leaves what matters, for others in place of each of them, and where it leaves
+    /// anything for others in place of noise: the first effects stood for a part of those that were not found yet, and noise for
+    /// several of them. Whether there is a better candidate then.
     pub(super) fn exchange(&mut self) -> bool {
         /// Leads in place of an effect.
         const EACH: usize = 3;
@@ -80,9 +87,11 @@ impl Search<'_> {
         let Some(best) = self.found.first().filter(|best| best.settings.len() > 1).cloned() else {
             return false;
         };
-        if self.settle(&best).is_none() || !self.remainder.matters() {
+        if self.settle(&best).is_none() || self.remainder.p >= SIGNIFICANT_P {
             return false;
         }
+        let matters = self.remainder.matters();
+        let may_stand_for_others = |place: &usize| matters || is_noise(&best.settings[*place]);
         let in_place_of = |place: usize| {
             let (less, own) = (best.less(place), best.settings[place].spec);
             let screened = screened(&self.evidence, &less.settings, &self.variants);
@@ -95,7 +104,8 @@ impl Search<'_> {
                 .map(|(lead, variant)| less.with(lead.in_pattern(variant, &self.evidence)))
                 .collect::<Vec<_>>()
         };
-        let starts = (0..best.settings.len()).flat_map(in_place_of).collect();
+        let places = (0..best.settings.len()).filter(may_stand_for_others);
+        let starts: Vec<Refined> = places.flat_map(in_place_of).collect();
         let mut others = self.pursued_together(starts);
         others.retain(|other| other.score() > best.score() + BETTER);
         let is_better = !others.is_empty();
