@@ -101,6 +101,40 @@ fn three_effects_of_which_another_stood_for_one() {
     holds(&found["effects"][2], "scale", 0.93, 1.0);
 }
 
+/// A wall that reflects more is found second, and does nothing beside the third: that leaves room for one more.
+#[test]
+fn an_effect_that_another_makes_needless() {
+    let effects = vec![
+        effect("ambient-offset", &[25.0]),
+        effect("crosstalk", &[0.15]),
+        effect("turn-scrub", &[0.06]),
+    ];
+    let found = named(effects, &["ambient-offset", "crosstalk", "turn-scrub"]);
+    holds(&found["effects"][0], "counts", 25.0, 0.0);
+    holds(&found["effects"][1], "fraction", 0.15, 0.0);
+    holds(&found["effects"][2], "fraction", 0.06, 0.0);
+}
+
+/// Beside the first, more slip is more likely than either of the others alone.
+#[test]
+fn wheels_that_are_off_in_two_ways_do_not_slip_more() {
+    let scratch = Scratch::new();
+    let off = "world = \"roduit2007\"\n[controller]\nkind = \"rule-based\"\n\
+               [[effect]]\nkind = \"response-exponent\"\nscale = 1.0231\n\
+               [[effect]]\nkind = \"wheel-asymmetry\"\nratio = 0.9794\n\
+               [[effect]]\nkind = \"wheel-scale\"\nfactor = 1.0154\n";
+    scratch.write("off.toml", off);
+    scratch.done("drive off.toml --runs 3 --laps 3 --log --seed 3 --quiet --out set".split(' '));
+    let found = trace(&scratch, "rule-based", "set", &[]);
+    says(
+        &found,
+        "explained",
+        &["response-exponent", "wheel-asymmetry", "wheel-scale"],
+    );
+    holds(&found["effects"][1], "ratio", 0.9794, 1.0);
+    holds(&found["effects"][2], "factor", 1.0154, 1.0);
+}
+
 /// The logs find a bump five units more likely, by readings that no edge spoils; the laps contradict it.
 #[test]
 fn laps_tell_a_patch_from_a_bump_that_logs_do_not() {
