@@ -1,8 +1,9 @@
 //! Logs of robots with several listed effects at once, or with one whose size is hard to find.
 
 use serde_json::Value;
-use sim::{Pattern, Setting, find};
+use sim::{Controller, Pattern, Setting, find};
 
+use crate::ground;
 use crate::support::Scratch;
 use crate::tracing::{Robot, explained_in_logs, holds, says, trace};
 
@@ -12,8 +13,14 @@ fn effect(name: &str, values: &[f64]) -> Setting {
 
 /// The answer to the logs of a reactive robot with these effects, which has to be these and nothing else.
 fn named(effects: Vec<Setting>, expected: &[&str]) -> Value {
+    named_with(ground::braitenberg(), effects, expected)
+}
+
+/// The same of a robot with any controller.
+fn named_with(controller: Controller, effects: Vec<Setting>, expected: &[&str]) -> Value {
     let first = effects[0].clone();
     let robot = Robot {
+        controller,
         effects,
         ..Robot::with(first).logged(&[3; 3])
     };
@@ -118,19 +125,13 @@ fn an_effect_that_another_makes_needless() {
 /// Beside the first, more slip is more likely than either of the others alone.
 #[test]
 fn wheels_that_are_off_in_two_ways_do_not_slip_more() {
-    let scratch = Scratch::new();
-    let off = "world = \"roduit2007\"\n[controller]\nkind = \"rule-based\"\n\
-               [[effect]]\nkind = \"response-exponent\"\nscale = 1.0231\n\
-               [[effect]]\nkind = \"wheel-asymmetry\"\nratio = 0.9794\n\
-               [[effect]]\nkind = \"wheel-scale\"\nfactor = 1.0154\n";
-    scratch.write("off.toml", off);
-    scratch.done("drive off.toml --runs 3 --laps 3 --log --seed 3 --quiet --out set".split(' '));
-    let found = trace(&scratch, "rule-based", "set", &[]);
-    says(
-        &found,
-        "explained",
-        &["response-exponent", "wheel-asymmetry", "wheel-scale"],
-    );
+    let effects = vec![
+        effect("response-exponent", &[1.0231]),
+        effect("wheel-asymmetry", &[0.9794]),
+        effect("wheel-scale", &[1.0154]),
+    ];
+    let expected = ["response-exponent", "wheel-asymmetry", "wheel-scale"];
+    let found = named_with(ground::rule_based(), effects, &expected);
     holds(&found["effects"][1], "ratio", 0.9794, 1.0);
     holds(&found["effects"][2], "factor", 1.0154, 1.0);
 }

@@ -62,13 +62,13 @@ impl<'w> Apparatus<'w> {
             steps: 0,
         };
         if !apparatus.moves() {
-            apparatus.cones = apparatus.cones();
+            apparatus.cones = apparatus.rays_by_sensors();
         }
         Ok(apparatus)
     }
 
     /// The rays of sensors by sensors, where these have many.
-    fn cones(&self) -> Option<Arc<Cones>> {
+    fn rays_by_sensors(&self) -> Option<Arc<Cones>> {
         let (own, worlds) = (&self.machine, &self.world.machine);
         if own.beam == worlds.beam && own.mounts == worlds.mounts {
             return self.world.cones.clone();

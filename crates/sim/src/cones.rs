@@ -77,7 +77,7 @@ impl Pack {
         number.checked_sub(self.first).filter(|place| *place < LANES)
     }
 
-    fn new((sensor, first_number): (usize, usize), mount: Mount, rays: &[(Vec2, f64)], range_m: f64) -> Self {
+    fn new((sensor, number): (usize, usize), mount: Mount, rays: &[(Vec2, f64)], range_m: f64) -> Self {
         /// Far more than the rounding of a place, m.
         const MARGIN_M: f64 = 1e-9;
         let axis = mount.axis();
@@ -87,7 +87,7 @@ impl Pack {
         let ray = |i: usize| (mount.position, axis.rotate(rays[i.min(rays.len() - 1)].0));
         Self {
             sensor,
-            first: first_number,
+            first: number,
             weights: std::array::from_fn(|i| rays.get(i).map_or(0.0, |ray| ray.1)),
             rays: Rays::new(std::array::from_fn(ray)),
             middle: mount.position + axis.rotate(along) * ahead_m,
@@ -138,9 +138,10 @@ mod tests {
     #[test]
     fn few_rays_make_no_cones_and_a_few_more_than_a_pack_stay_sights() {
         let sights = |rays: usize| {
-            let mut machine = declared().machine;
-            machine.beam = Beam::cone(rays, 0.3, Combine::Responses).unwrap();
-            Cones::new(&machine, scene().declared_geometry(), None).map_or(0, |cones| cones.sights())
+            let mut model = declared();
+            model.machine.beam = Beam::cone(rays, 0.3, Combine::Responses).unwrap();
+            let world = scene().world(&model, 0).unwrap();
+            world.cones.map_or(0, |cones| cones.sights())
         };
         assert_eq!([1, 4, 5, 8, 10, 13, 16].map(sights), [0, 0, 5, 8, 8, 13, 16]);
     }

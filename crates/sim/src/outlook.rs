@@ -47,7 +47,7 @@ impl Places {
     }
 }
 
-/// Eight rays, one of each sensor: how their distances change with x, y and heading, and the standard deviations of these, m.
+/// Eight rays: how their distances change with x, y and heading, and the standard deviations of these, m.
 struct Doubt {
     slope: [[f64; LANES]; 3],
     deviation_m: [f64; LANES],
@@ -60,6 +60,14 @@ struct Met {
 }
 
 impl Met {
+    /// What rays hit, as it is.
+    fn plainly(hits: &Hits) -> Self {
+        Self {
+            distance_m: hits.distance_m,
+            factor: [1.0; LANES],
+        }
+    }
+
     /// Whether no reading tells them apart: what is far along a wall has tails that never end.
     fn is_as_good_as(&self, other: &Self) -> bool {
         const NOTHING_M: f64 = 1e-9;
@@ -219,10 +227,7 @@ impl Apparatus<'_> {
         if !self.displacing.is_empty() {
             return self.met_at(ray_hits.hits, &Places::of(ray_hits));
         }
-        let mut met = Met {
-            distance_m: ray_hits.hits.distance_m,
-            factor: [1.0; LANES],
-        };
+        let mut met = Met::plainly(ray_hits.hits);
         if self.weighs_rays {
             let factors = self.effects.ray_factors(ray_hits);
             for lane in ray_hits.lanes() {
@@ -234,10 +239,7 @@ impl Apparatus<'_> {
 
     /// The same where it is known what the rays met.
     fn met_at(&self, hits: &Hits, places: &Places) -> Met {
-        let mut met = Met {
-            distance_m: hits.distance_m,
-            factor: [1.0; LANES],
-        };
+        let mut met = Met::plainly(hits);
         for (lane, place) in places.0.iter().enumerate() {
             let Some((hit, towards)) = place else { continue };
             let moved_m: f64 = (self.displacing.iter())

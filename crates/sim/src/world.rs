@@ -156,12 +156,6 @@ impl Scene {
         &self.declared.caster
     }
 
-    /// The walls without effects.
-    #[cfg(test)]
-    pub(crate) fn declared_geometry(&self) -> &Geometry {
-        &self.declared
-    }
-
     /// What run number `run` of a model drives in. The model must have the wall rules that the scene was made for.
     ///
     /// # Errors
